@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from typing import TYPE_CHECKING
 
@@ -62,3 +63,29 @@ def overlap(one: Bbox, other: Bbox) -> bool:
     wide = min(one.x1, other.x1) - max(one.x0, other.x0)
     high = min(one.y1, other.y1) - max(one.y0, other.y0)
     return bool(wide > 1.5 and high > 1.5)
+
+
+def assert_room(figure: Figure) -> None:
+    """Assert that no text is cut, covers another, or extends into another's panel."""
+    whole, boxes = figure.bbox, []
+    panels = [("a panel", axes.get_window_extent()) for axes in figure.axes if axes.axison]
+    beyond = {
+        label  # matplotlib does not draw it
+        for axes in figure.axes
+        for axis in (axes.xaxis, axes.yaxis)
+        for label, at in zip(axis.get_ticklabels(), axis.get_ticklocs(), strict=True)
+        if not min(axis.get_view_interval()) <= at <= max(axis.get_view_interval())
+    }
+    for text in figure.findobj(Text):
+        if not shown(text) or text in beyond:
+            continue
+        name, box = text.get_text(), text.get_window_extent()
+        if box.width == 0:
+            continue
+        assert whole.x0 - 1 <= box.x0 <= box.x1 <= whole.x1 + 1, name
+        assert whole.y0 - 1 <= box.y0 <= box.y1 <= whole.y1 + 1, name
+        boxes.append((name, box))
+        if not any(text in axes.texts for axes in figure.axes):  # a warning
+            assert not [panel for _, panel in panels if overlap(box, panel)], name
+    for (one, a), (other, b) in itertools.combinations(boxes, 2):
+        assert not overlap(a, b), (one, other)

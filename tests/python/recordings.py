@@ -70,3 +70,14 @@ class ReadBack:
 
 def recorded(dataset: xr.Dataset, folder: Path) -> ReadBack:
     return ReadBack(viewer.record(dataset, folder / "a.rrd"))
+
+
+def scalars(back: ReadBack, entity: str) -> npt.NDArray[np.float64]:
+    return back.rows(entity, "Scalars:scalars")
+
+
+def hanging(back: ReadBack, bob: str, pivot: float) -> npt.NDArray[np.float64]:
+    """Return the angle of a pendulum whose arm has length 1."""
+    at = back.rows(bob, "Points2D:positions") - (pivot, 0.0)
+    assert np.allclose(np.hypot(*at.T), 1.0, atol=1e-5)
+    return np.arctan2(at[:, 0], -at[:, 1])

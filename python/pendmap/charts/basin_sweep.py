@@ -11,7 +11,7 @@ import numpy as np
 
 from pendmap.analysis.orbit_table import attractors_of
 from pendmap.analysis.sweeps.report import varied_names
-from pendmap.charts import names, palette, plane
+from pendmap.charts import names, palette, parameters, plane
 from pendmap.charts.chart import Axis, Chart, Panel, holding
 from pendmap.charts.legend import typeset
 from pendmap.charts.marks import (
@@ -28,7 +28,6 @@ from pendmap.charts.marks import (
     Text,
     bars,
 )
-from pendmap.errors import InputError
 from pendmap.files import facts
 from pendmap.formatting import typographic
 from pendmap.units import Units
@@ -55,7 +54,6 @@ LAYERS: Final = {
 _LEADING: Final = ("entropy", "attractors", "main")
 _SIZE: Final = (7.4, 8.4)  # Size of a figure over one parameter, inches
 _HEIGHTS: Final = {"fraction": 2.6, "entropy": 1.2, "uncertainty": 1.2, "exponent": 1.3}
-_MOST_COUNT: Final = 8  # Largest count that has its own colour
 
 
 @dataclass(frozen=True)
@@ -91,15 +89,24 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
     """Return shares, entropies and exponents along a parameter, or maps over two."""
     dims = varied_names(dataset)
     dataset = dataset.transpose(..., "attractor")
-    symbols = [names.symbol(one, str(dataset[one].attrs.get("units", "1"))) for one in dims]
-    fixed = names.parameters(facts(dataset), dims)
     rows, columns = dataset.sizes["velocity"], dataset.sizes["theta"]
     number = math.prod(dataset.sizes[one] for one in dims)
-    title = f"Basins along {' and '.join(one.split(' (')[0] for one in symbols)}"
+    fixed = names.parameters(facts(dataset), dims)
     subtitle = f"{fixed};   {number} maps of {columns} × {rows} cells"
+    titles = f"Basins along {parameters.over(dims)}", subtitle
     if len(dims) == 1:
-        return _line(dataset, dims[0], symbols[0], title, subtitle, layer)
-    return _plane(dataset, symbols, title, subtitle, layer, cells)
+        return _line(dataset, dims[0], titles, layer)
+    first, second = dims
+    shares = {f"share {k + 1}": k for k in range(dataset.sizes["attractor"])}
+    parameters.check_layer(layer, [*LAYERS, *shares], "this sweep: ")
+    dataset = dataset.transpose(second, first, ...)
+
+    def make(name: str, across: Ends, up: Ends) -> tuple[str, list[Mark]]:
+        title, values, colours = _layer(dataset, name, shares.get(name), cells)
+        return title, [Image(values, across, up, colours=colours, path="values")]
+
+    shown = [layer] if layer else list(LAYERS)
+    return parameters.layers(dataset, (first, second), titles, make, shown, _LEADING)
 
 
 def models(
@@ -132,42 +139,32 @@ def models(
         yield at, Panel("basin", "basins of attraction", *sides, marks), ratio
 
 
-def _line(  # noqa: PLR0913, PLR0917 (parts of a chart)
-    dataset: xr.Dataset, dim: str, symbol: str, title: str, subtitle: str, layer: str | None
-) -> Chart:
+def _line(dataset: xr.Dataset, dim: str, titles: tuple[str, str], layer: str | None) -> Chart:
     """Return the chart over one parameter."""
-    x, ends = dataset[dim].values, plane.outer_edges(dataset, dim)
-    every = listed(dataset)
-    units = Units.of(facts(dataset))
-    below = Axis(symbol, ends)
-    bare = Axis("", ends, ticks=()) if layer is None else below
+    x, every = dataset[dim].values, listed(dataset)
+    below = parameters.axis(dataset, dim)
+    bare = Axis("", below.ends, ticks=()) if layer is None else below
     entropies = _entropies(dataset, x)
-    exponents = _growth(dataset, x, every, named=layer is not None)
-    known = dataset["exponent"].values
-    rates = plane.padded(np.append(known[np.isfinite(known)], 0.0))
-    axes = {
-        "fraction": Axis("share of the starts", (0.0, 1.0)),
-        "entropy": Axis("entropy\n(nat)", _from_0(entropies, math.log(2))),
-        "uncertainty": Axis("uncertainty\nexponent", (0.0, 1.1)),
-        "exponent": Axis(f"exponent\n{names.per_time(units)}", rates),
+    exponent = f"exponent\n{names.per_time(Units.of(facts(dataset)))}"
+    parts: dict[str, tuple[Axis, list[Mark]]] = {
+        "fraction": (Axis("share of the starts", (0.0, 1.0)), _stack(dataset, dim, every)),
+        "entropy": (Axis("entropy\n(nat)", _from_0(entropies, math.log(2))), entropies),
+        "uncertainty": (Axis("uncertainty\nexponent", (0.0, 1.1)), _uncertainty(dataset, x)),
+        "exponent": (
+            Axis(exponent, parameters.rates(dataset["exponent"].values)),
+            _growth(dataset, x, every, named=layer is not None),
+        ),
     }
-    marks = {
-        "fraction": _stack(dataset, dim, every),
-        "entropy": entropies,
-        "uncertainty": _uncertainty(dataset, x),
-        "exponent": exponents,
-    }
-    shown = [name for name in axes if name != "uncertainty" or marks[name]]
     panels = [
-        Panel(name, "", below if name == shown[-1] else bare, axes[name], marks[name])
-        for name in shown
+        Panel(name, "", below if name == "exponent" else bare, up, marks)
+        for name, (up, marks) in parts.items()
+        if marks
     ]
     return Chart(
-        title,
-        subtitle,
+        *titles,
         [[panel] for panel in panels],
         recorded=panels,
-        heights=[_HEIGHTS[name] for name in shown],
+        heights=[_HEIGHTS[panel.name] for panel in panels],
         size=_SIZE,
         letters=False,
         tabs=True,
@@ -175,10 +172,7 @@ def _line(  # noqa: PLR0913, PLR0917 (parts of a chart)
 
 
 def _stack(dataset: xr.Dataset, dim: str, every: list[Branch]) -> list[Mark]:
-    """Return the shares of the attractors on one another, with their errors, then undecided starts.
-
-    Each share is as wide as its cell: nothing is known between two values.
-    """
+    """Return the shares of the attractors on one another with errors, then undecided starts."""
     x, edges = dataset[dim].values, np.repeat(plane.edges(dataset, dim), 2)[1:-1]
     fraction, stderr = dataset["fraction"].values, dataset["stderr"].values
     top = np.zeros(x.size)
@@ -196,8 +190,8 @@ def _stack(dataset: xr.Dataset, dim: str, every: list[Branch]) -> list[Mark]:
         ends = np.repeat(low, 2), np.repeat(top, 2)
         marks.append(Band(edges, *ends, colour=colour, name=name, path=f"{k + 1}/share"))
         size = stderr[:, k] if k < len(every) and every[k].name else np.zeros(x.size)
-        own = size > 0
-        at = bars(x[own], (top - size)[own], (top + size)[own])
+        mine = size > 0
+        at = bars(x[mine], (top - size)[mine], (top + size)[mine])
         marks.append(Line(*at, width=0.6, colour=INK, order=3.0))
     return marks
 
@@ -222,10 +216,7 @@ def _entropies(dataset: xr.Dataset, x: Floats) -> list[Mark]:
 
 
 def _uncertainty(dataset: xr.Dataset, x: Floats) -> list[Mark]:
-    """Return the uncertainty exponent with its error: 1 where the boundary is smooth.
-
-    There are no marks where no grid is fine enough for it.
-    """
+    """Return the uncertainty exponent with its error: 1 where the boundary is smooth."""
     value, error = (dataset[f"uncertainty_exponent{end}"].values for end in ("", "_stderr"))
     if not np.isfinite(value).any():
         return []
@@ -257,35 +248,10 @@ def _from_0(marks: list[Mark], least: float) -> Ends:
     return 0.0, holding(*values, [0.0, 1.1 * least])[1]
 
 
-def _plane(  # noqa: PLR0913, PLR0917 (parts of a chart)
-    dataset: xr.Dataset,
-    symbols: list[str],
-    title: str,
-    subtitle: str,
-    layer: str | None,
-    cells: int,
-) -> Chart:
-    """Return the chart over two parameters, the first one to the right."""
-    shares = {f"share {k + 1}": k for k in range(dataset.sizes["attractor"])}
-    if layer is not None and layer not in (*LAYERS, *shares):
-        known = ", ".join([*LAYERS, *shares])
-        raise InputError(f"layer must be one of this sweep: {known}, got {layer!r}")
-    first, second = varied_names(dataset)
-    dataset = dataset.transpose(second, first, ...)
-    across, up = (plane.outer_edges(dataset, one) for one in (first, second))
-    sides = Axis(symbols[0], across), Axis(symbols[1], up)
-    panels = []
-    for one in [layer] if layer else LAYERS:
-        text, image = _image(dataset, one, shares.get(one), across, up, cells)
-        panels.append(Panel(one, text, *sides, [image]))
-    leading = panels if layer else [panel for panel in panels if panel.name in _LEADING]
-    return Chart(title, subtitle, [leading], recorded=panels, ratio=0.85, tabs=True)
-
-
-def _image(  # noqa: PLR0913, PLR0917 (parts of an image)
-    dataset: xr.Dataset, layer: str, which: int | None, across: Ends, up: Ends, cells: int
-) -> tuple[str, Image]:
-    """Return the title and the image of a layer."""
+def _layer(
+    dataset: xr.Dataset, layer: str, which: int | None, cells: int
+) -> tuple[str, Floats, Colours]:
+    """Return the title of a layer over two parameters, its values and their colours."""
     name, text, unit = LAYERS[layer if which is None else "main"]
     array, title = dataset[name], text
     if name == "fraction":
@@ -295,17 +261,11 @@ def _image(  # noqa: PLR0913, PLR0917 (parts of an image)
         title = f"{text} on {typeset(str(dataset['attractor'].values[which]))}"
     values = np.asarray(plane.pixels(dataset, array, cells), dtype=np.float64)
     if layer == "boundary":
-        values = np.where(
-            plane.pixels(dataset, dataset["boundary_boxes"], cells) > 0, values, np.nan
-        )
-    said = f"{text} ({unit})" if unit else text
+        boxes = plane.pixels(dataset, dataset["boundary_boxes"], cells)
+        values = np.where(boxes > 0, values, np.nan)
     if layer == "attractors":
-        top = int(min(values.max(initial=1), _MOST_COUNT))
-        beyond: Any = "max" if values.max(initial=0) > top else "neither"
-        whole = [float(k) for k in range(top + 1)]
-        look = Colours(said, "viridis", -0.5, top + 0.5, "counts", beyond, whole)
-    else:
-        known = values[np.isfinite(values)]
-        high = 1.0 if unit == "" else max(float(known.max(initial=0.0)), 1e-3)
-        look = Colours(said, "magma" if unit else "cividis", 0.0, high)
-    return title, Image(values, across, up, colours=look, path="values")
+        return title, values, parameters.counts(text, values)
+    if not unit:
+        return title, values, Colours(text, "cividis", 0.0, 1.0)
+    high = max(float(values[np.isfinite(values)].max(initial=0.0)), 1e-3)
+    return title, values, Colours(f"{text} ({unit})", "magma", 0.0, high)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
 import math
 from typing import TYPE_CHECKING, Any, Final
@@ -12,8 +11,8 @@ import numpy as np
 from pendmap import _core
 from pendmap.analysis.orbit_table import chaotic
 from pendmap.charts import legend, names, plane
-from pendmap.charts.chart import Axis, Chart, Panel
-from pendmap.charts.marks import INK, NONE, QUIET, Colours, Ends, Image, Mark, Points, Text
+from pendmap.charts.chart import Chart, Panel, holding
+from pendmap.charts.marks import INK, NONE, QUIET, Colours, Ends, Image, Mark, Points
 from pendmap.errors import InputError
 from pendmap.files import facts
 from pendmap.formatting import counted, typographic, with_error
@@ -40,7 +39,6 @@ VARIABLES = {
 """Layers by the name a user types, and the variable of each."""
 
 FLAT: Final = 0.55  # Height over width of panels below which they are stacked
-_PATHS: Final = {"settle": "steps"}  # Paths in a recording that are not the name of the layer
 _COLOUR_MAPS: Final = {
     "settle": "viridis",
     "turns": "RdBu_r",
@@ -51,77 +49,45 @@ _COLOUR_MAPS: Final = {
 
 
 def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -> Chart:
-    """Return the leading layers: two, or three if the labels are unreliable; or one alone."""
-    shown = (named(dataset, layer),) if layer else _leading(dataset)
+    """Return a panel for each layer, or for one alone; a figure shows the leading ones."""
+    shown = (named(dataset, layer),) if layer else layers(dataset)
     theta, velocity = (plane.outer_edges(dataset, axis) for axis in ("theta", "velocity"))
-    units = Units.of(facts(dataset))
+    units, no_labels = Units.of(facts(dataset)), finite_time(dataset)
     listed = legend.entries(dataset)
     chaos = [entry for entry in listed if entry.chaotic and len(entry.points)]
-    if "labels" not in shown and (layer or not finite_time(dataset)):
-        own = not finite_time(dataset)  # else chaos is shown by the panel of its attractor alone
-        listed = [entry for entry in listed if entry.id < 1 or (entry.chaotic and own)]
-    window = theta, velocity
+    if "labels" not in shown and (layer or not no_labels):
+        # Without labels the panel of its attractor alone shows chaos.
+        listed = [entry for entry in listed if entry.id < 1 or (entry.chaotic and not no_labels)]
     sides = names.phase_plane(theta, velocity, units)
     panels = []
     for one in shown:
-        marks = _layer(dataset, one, cells, window, listed)
-        if one == "labels":
-            marks += _attractors(dataset, listed, theta, velocity)
+        marks = _layer(dataset, one, cells, (theta, velocity), listed, shown)
         if one == shown[0]:
             marks += _names(dataset, listed, shown)
+        if one == "labels":
+            marks += _attractors(dataset, listed, (theta, velocity), shown)
+        root = "basin" if one == "labels" else one
         doubt = warning(dataset) if one == "labels" and not reliable(dataset) else ""
-        panels.append(Panel(one, what(dataset, one), *sides, marks, warning=doubt))
-    recorded = [] if layer else _recorded(dataset, cells, window, sides)
-    if finite_time(dataset) and layer is None and chaos:
+        panels.append(Panel(one, what(dataset, one), *sides, marks, root=root, warning=doubt))
+    leading = panels[: 2 if no_labels or reliable(dataset) else 3]
+    if no_labels and layer is None and chaos:
         panels.append(_section(dataset, chaos, units))
-        recorded.append(dataclasses.replace(panels[-1], root="basin"))
+        leading.append(panels[-1])
     ratio = names.proportion(theta, velocity, units)
     rows, columns = dataset["label"].shape
     subtitle = [names.parameters(facts(dataset)), f"{columns} × {rows} cells"]
-    if layer is None and finite_time(dataset):
+    if layer is None and no_labels:
         subtitle.append(exponents(dataset))
     elif layer is None and not reliable(dataset):
         subtitle.append(transients(dataset))
     return Chart(
         _title(dataset, shown),
         ";   ".join(filter(None, subtitle)),
-        [[panel] for panel in panels] if ratio < FLAT else [panels],
-        recorded=recorded,
+        [[panel] for panel in leading] if ratio < FLAT else [leading],
+        recorded=panels,
         ratio=ratio,
         tabs=True,
     )
-
-
-def _recorded(
-    dataset: xr.Dataset, cells: int, window: tuple[Ends, Ends], sides: tuple[Axis, Axis]
-) -> list[Panel]:
-    """Return a panel for each layer of a recording, the leading one first."""
-    listed, panels = legend.entries(dataset), []
-    shown = layers(dataset)
-    for one in shown:
-        marks = _layer(dataset, one, cells, window, listed, named=True)
-        if one == "labels" or not finite_time(dataset):
-            marks += _attractors(dataset, listed, *window)
-        if one == "labels":
-            for entry in listed:
-                at = plane.copies(dataset, entry.points[:1], *window[0])
-                if len(at) and not entry.chaotic:
-                    name = legend.typeset(entry.name)
-                    marks.append(Text(at[0, 0], at[0, 1], name, colour="#ffffff"))
-        if one == shown[0]:
-            marks += _names(dataset, listed, shown)
-        root = "basin" if one == "labels" else one
-        unsure = one == "labels" and not reliable(dataset)
-        alarm = warning(dataset) if unsure else ""
-        title = "labels (unreliable)" if unsure else what(dataset, one)
-        panels.append(Panel(one, title, *sides, marks, root=root, warning=alarm))
-    return panels
-
-
-def _leading(dataset: xr.Dataset) -> tuple[str, ...]:
-    """Return the layers of the standard figure."""
-    every = layers(dataset)
-    return every[:2] if finite_time(dataset) or reliable(dataset) else every[:3]
 
 
 def _title(dataset: xr.Dataset, shown: tuple[str, ...]) -> str:
@@ -135,18 +101,15 @@ def _title(dataset: xr.Dataset, shown: tuple[str, ...]) -> str:
 
 
 def _names(dataset: xr.Dataset, listed: list[legend.Entry], shown: tuple[str, ...]) -> list[Mark]:
-    """Return the legend: each basin's colour with the attractor's marker."""
-    named: list[Mark] = []
-    for entry in listed:
-        text = _said(dataset, entry, shown)
-        look: dict[str, Any] = {"colour": entry.colour, "name": text, "edge": QUIET}
-        named.append(Points(NONE, NONE, marker="s", size=9.0, edge_width=0.5, **look))
-        if entry.id >= 1 and not entry.chaotic:
-            named.append(_marker(entry, np.empty((0, 2)), text, 5.0))
-    return named
+    """Return the legend: each basin's colour."""
+    look: dict[str, Any] = {"marker": "s", "size": 9.0, "edge": QUIET, "edge_width": 0.5}
+    return [
+        Points(NONE, NONE, colour=entry.colour, name=_text(dataset, entry, shown), **look)
+        for entry in listed
+    ]
 
 
-def _said(dataset: xr.Dataset, entry: legend.Entry, shown: tuple[str, ...]) -> str:
+def _text(dataset: xr.Dataset, entry: legend.Entry, shown: tuple[str, ...]) -> str:
     """Return the text of an attractor in the legend."""
     if finite_time(dataset) and entry.chaotic:
         return f"{legend.typeset(entry.name)}, {entry.share} of the starts"
@@ -154,62 +117,35 @@ def _said(dataset: xr.Dataset, entry: legend.Entry, shown: tuple[str, ...]) -> s
     return f"{entry.text} (dots: its points)" if dots else entry.text
 
 
-def _marker(
-    entry: legend.Entry, at: npt.NDArray[np.float64], name: str = "", size: float = 5.5
-) -> Points:
-    path = "" if name else f"attractors/{entry.id}"
-    look: dict[str, Any] = {
-        "marker": entry.marker,
-        "size": size,
-        "colour": entry.colour,
-        "name": name,
-    }
-    look |= {"path": path, "edge": "#ffffff", "edge_width": 0.17 * size, "halo": INK}
-    return Points(*at.T, clip=False, order=5.0, **look)
-
-
-def _layer(  # noqa: PLR0913 (parts of an image)
+def _layer(  # noqa: PLR0913, PLR0917 (parts of an image)
     dataset: xr.Dataset,
     layer: str,
     cells: int,
     window: tuple[Ends, Ends],
     listed: list[legend.Entry],
-    *,
-    named: bool = False,
+    shown: tuple[str, ...],
 ) -> list[Mark]:
-    """Return one layer; cells without a value have the colour of their label.
-
-    The classes are ``named`` in a recording, which shows the name where one points.
-    """
+    """Return one layer; cells without a value have the colour of their label."""
     label = plane.pixels(dataset, dataset["label"], cells)
-    colours = ["#{:02x}{:02x}{:02x}".format(*row) for row in legend.colours(dataset)]
-    classes = [("", colour) for colour in colours]
-    for entry in listed if named else ():
-        text = _said(dataset, entry, layers(dataset))
-        classes[entry.id + 1] = (text, classes[entry.id + 1][1])
-    shown = label.astype(np.int16) + 1
+    texts = {entry.id: _text(dataset, entry, shown) for entry in listed}
+    colours = ("#{:02x}{:02x}{:02x}".format(*row) for row in legend.colours(dataset))
+    classes = [(texts.get(number, ""), colour) for number, colour in enumerate(colours, -1)]
+    path = "labels" if layer == "labels" else "without"
+    labels = Image(label.astype(np.int16) + 1, *window, classes=classes, path=path)
     if layer == "labels":
-        return [Image(shown, *window, classes=classes, path="labels")]
-    labels = Image(shown, *window, classes=classes, path="without")
-    own = plane.pixels(dataset, dataset[VARIABLES[layer]], cells)
-    absent, values = missing(layer, own) | (label < 0), own.astype(np.float32)
+        return [labels]
+    mine = plane.pixels(dataset, dataset[VARIABLES[layer]], cells)
+    absent, values = missing(layer, mine) | (label < 0), mine.astype(np.float32)
     if layer == "settle":
         np.maximum(values, 1.0, out=values)
     values[absent] = np.nan
     look = _colours(dataset, layer, values[~absent])
-    return [
-        *([labels] if absent.any() else []),
-        Image(values, *window, colours=look, path=_PATHS.get(layer, layer)),
-    ]
+    image = Image(values, *window, colours=look, path="steps" if layer == "settle" else layer)
+    return [labels, image] if absent.any() else [image]
 
 
 def _colours(dataset: xr.Dataset, layer: str, values: npt.NDArray[np.float32]) -> Colours:
-    """Return the colour scale of a layer.
-
-    Settle time is logarithmic; net turns are symmetric about 0 and saturate at the outermost two
-    percent, so that a few long transients do not compress the rest, as does the exponent.
-    Probabilities reach from 0 to 1, entropies start at 0.
-    """
+    """Return the colour scale of a layer."""
     name, colours = unit(dataset, layer), _COLOUR_MAPS[layer]
     if values.size == 0 or layer == "probability":
         return Colours(name, colours, 0.0, 1.0)
@@ -237,19 +173,21 @@ def _colours(dataset: xr.Dataset, layer: str, values: npt.NDArray[np.float32]) -
 def _attractors(
     dataset: xr.Dataset,
     listed: list[legend.Entry],
-    theta: tuple[float, float],
-    velocity: tuple[float, float],
+    window: tuple[Ends, Ends],
+    shown: tuple[str, ...],
 ) -> list[Mark]:
     """Return the points of all attractors, with their copies shifted by 2 pi."""
     marks: list[Mark] = []
     for entry in listed:
-        at = plane.copies(dataset, entry.points, *theta)
-        at = at[(at[:, 1] >= velocity[0]) & (at[:, 1] <= velocity[1])]
-        if entry.chaotic:
-            path = f"attractors/{entry.id}"
-            marks.append(Points(*at.T, size=1.1, order=4.0, path=path))
-        elif len(at):
-            marks.append(_marker(entry, at))
+        at = plane.copies(dataset, entry.points, *window[0])
+        at = at[(at[:, 1] >= window[1][0]) & (at[:, 1] <= window[1][1])]
+        look: dict[str, Any] = {"size": 1.1, "order": 4.0, "path": f"attractors/{entry.id}"}
+        if not entry.chaotic:
+            look |= {"size": 5.5, "edge_width": 0.935, "edge": "#ffffff", "halo": INK}
+            look |= {"marker": entry.marker, "colour": entry.colour}
+            look |= {"clip": False, "order": 5.0, "name": _text(dataset, entry, shown)}
+        if len(at) or entry.chaotic:
+            marks.append(Points(*at.T, **look))
     return marks
 
 
@@ -260,10 +198,9 @@ def _section(dataset: xr.Dataset, chaos: list[legend.Entry], units: Units) -> Pa
         for entry in chaos
     ]
     points = np.concatenate([entry.points for entry in chaos])
-    pad = 0.05 * max(float(np.ptp(points[:, 1])), 1e-3)
-    speeds = float(points[:, 1].min()) - pad, float(points[:, 1].max()) + pad
+    speeds = holding(points[:, 1], margin=0.05)
     sides = names.phase_plane(plane.angles(dataset, points[:, 0]), speeds, units)
-    return Panel("section", "its attractor, once a period", *sides, dots)
+    return Panel("section", "its attractor, once a period", *sides, dots, root="basin")
 
 
 def missing(layer: str, values: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
@@ -305,9 +242,9 @@ def transients(dataset: xr.Dataset) -> str:
     mean, longest, entropy = (float(facts(dataset).get(key, math.nan)) for key in keys)
     settle = [f"mean {mean:.3g}"] if mean >= 0 else []
     settle += [f"longest {longest:g}"] if longest >= 0 else []
-    told = [f"settle time: {', '.join(settle)} periods"] if settle else []
-    told += [f"basin entropy {entropy:.3g}"] if math.isfinite(entropy) else []
-    return "; ".join(told)
+    parts = [f"settle time: {', '.join(settle)} periods"] if settle else []
+    parts += [f"basin entropy {entropy:.3g}"] if math.isfinite(entropy) else []
+    return "; ".join(parts)
 
 
 def exponents(dataset: xr.Dataset) -> str:
@@ -362,8 +299,9 @@ def what(dataset: xr.Dataset, layer: str) -> str:
         turns = f"after {periods}"
     elif not settles(dataset):
         turns = f"after {counted(int(dataset.attrs['max_periods']), 'period')}"
+    unsure = "" if reliable(dataset) else " (unreliable)"
     return {
-        "labels": "basins of attraction",
+        "labels": f"basins of attraction{unsure}",
         "settle": "settle time",
         "turns": f"net turns {turns}",
         "exponent": f"finite-time exponent over {periods}",
@@ -376,9 +314,9 @@ def unit(dataset: xr.Dataset, layer: str) -> str:
     """Return the unit of a scalar layer, for a colour bar; without drive also the period."""
     driven = float(facts(dataset).get("p", 1.0)) != 0.0
     units = Units.of(facts(dataset))
-    own = "" if driven else f" of {units.own_period.replace(' pi', 'π').replace(' ', '')}"
+    mine = "" if driven else f" of {units.own_period.replace(' pi', 'π').replace(' ', '')}"
     return {
-        "settle": f"periods{own} to settle",
+        "settle": f"periods{mine} to settle",
         "turns": "net turns",
         "exponent": f"exponent {names.per_time(units)}",
         "probability": "probability",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.analysis.orbit_table import attractors_of
-from pendmap.charts import names, palette, plane
+from pendmap.charts import names, palette, parameters, plane
 from pendmap.charts.chart import Axis, Chart, Panel
 from pendmap.charts.legend import colours_of, typeset
 from pendmap.charts.marks import QUIET, Image, Level, Mark, Points
@@ -54,32 +54,29 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
         layers = ", ".join([*_POINTS, *_BELOW])
         raise InputError(f"layer must be one of {layers} in a diagram, got {shown!r}")
     alone = shown in _BELOW
-    own = str(dataset.attrs["varied"])
-    name = names.symbol(own, str(dataset[own].attrs.get("units", "1")))
-    ends = plane.outer_edges(dataset, own)
-    every = families(dataset)
-    units = Units.of(facts(dataset))
+    varied = str(dataset.attrs["varied"])
+    below, every = parameters.axis(dataset, varied), families(dataset)
+    units, ends = Units.of(facts(dataset)), plane.outer_edges(dataset, varied)
     theta = plane.angles(dataset, dataset["point_theta"].values)
     speeds = plane.padded(np.append(dataset["point_velocity"].values, 0.0))
-    known = dataset["entry_exponent"].values
-    growth = plane.padded(np.append(known[np.isfinite(known)], 0.0))
-    bare, rate = Axis("", ends, ticks=()), Axis(f"exponent {names.per_time(units)}", growth)
+    angle, speed = names.phase_plane(theta, speeds, units)
+    bare = Axis("", ends, ticks=())
+    growth = parameters.rates(dataset["entry_exponent"].values)
+    rate = Axis(f"exponent {names.per_time(units)}", growth)
     exponents: list[Mark] = [Level(0.0, colour=QUIET)]
     for k, one in reversed([*enumerate(every)]):
-        called = _said(every, k) if alone else ""
-        exponents.append(_dots(dataset, one, one.exponents, 1.6, f"{k}/points", called))
-    angle, speed = Axis(names.ANGLE, theta, "angle"), Axis(names.speed(units), speeds)
+        name = _text(every, k) if alone else ""
+        exponents.append(_dots(dataset, one, one.exponents, 1.6, f"{k}/points", name))
     panels = [
         Panel("theta", "", bare, angle, _points(dataset, every, "theta"), root="bifurcation"),
         Panel("velocity", "", bare, speed, _points(dataset, every, "velocity")),
         Panel("sweeps", "", bare, _STRIP, _sweeps(dataset, every, ends, cells)),
-        Panel("exponent", "", Axis(name, ends), rate, exponents),
+        Panel("exponent", "", below, rate, exponents),
     ]
-    count, starts = dataset.sizes[own], int(dataset.attrs["starts"])
-    fixed = names.parameters(facts(dataset), [own])
+    count, starts = dataset.sizes[varied], int(dataset.attrs["starts"])
     return Chart(
-        f"Bifurcations over {name.split(' (')[0]}",
-        f"{fixed};   {count} values, {starts} starts each",
+        f"Bifurcations over {parameters.over([varied])}",
+        f"{names.parameters(facts(dataset), [varied])};   {count} values, {starts} starts each",
         [[panels[0 if alone else _POINTS.index(shown)]], [panels[2]], [panels[3]]],
         recorded=panels,
         heights=_HEIGHTS,
@@ -110,7 +107,7 @@ def _points(dataset: xr.Dataset, every: list[Family], which: str) -> list[Mark]:
     for k, one in reversed([*enumerate(every)]):
         of = 0.45 if one.chaotic else size
         points = one.points[:, [0, column]]
-        drawn.append(_dots(dataset, one, points, of, f"{k}/points", _said(every, k)))
+        drawn.append(_dots(dataset, one, points, of, f"{k}/points", _text(every, k)))
     return drawn
 
 
@@ -122,7 +119,7 @@ def _sweeps(
     classes = [("", "#ffffff")]
     for k, one in enumerate(every):
         strip[1, one.up] = strip[0, one.down] = k + 1
-        classes.append((_said(every, k), one.colour))
+        classes.append((_text(every, k), one.colour))
     if (strip == 0).any():
         classes[0] = ("sweep on none", "#ffffff")
     shown = strip[:, plane.cells(plane.edges(dataset, str(dataset.attrs["varied"])), cells)]
@@ -130,7 +127,7 @@ def _sweeps(
     return [image, Level(0.0, colour="#ffffff", width=1.2)]
 
 
-def _said(every: list[Family], k: int) -> str:
+def _text(every: list[Family], k: int) -> str:
     """Return the entry of a family in the legend; the rare ones share one."""
     return typeset(every[k].name) if k < MOST else f"{len(every) - MOST} more" * (k == MOST)
 

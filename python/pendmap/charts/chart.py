@@ -153,8 +153,8 @@ class Sheet:
             return self
         panel = _named(self.panels, layer)
         charts = (chart for column in self.columns for chart in column)
-        own = next(one for one in charts if layer in {each.name for each in one.panels})
-        return Chart(self.title, own.title or self.subtitle, [[panel]])
+        mine = next(one for one in charts if layer in {item.name for item in one.panels})
+        return Chart(self.title, mine.title or self.subtitle, [[panel]])
 
 
 def _named(panels: Sequence[Panel], layer: str) -> Panel:
@@ -176,7 +176,7 @@ def bare(name: str, *marks: Mark, high: float = 1.0) -> Panel:
 
 def holding(*values: npt.ArrayLike, margin: float = 0.06) -> Ends:
     """Return the limits of an axis that contains all finite values, with a margin."""
-    every = np.concatenate([np.ravel(np.asarray(each, dtype=float)) for each in values])
+    every = np.concatenate([np.ravel(np.asarray(one, dtype=float)) for one in values])
     known = every[np.isfinite(every)]
     low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
     pad = margin * (high - low) or (0.0 if high > low else 0.06 * max(abs(low), 1.0))

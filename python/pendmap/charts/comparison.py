@@ -56,22 +56,18 @@ _SI: Final = Units(si=True)
 
 
 def sheet(comparison: Comparison) -> Sheet:
-    """Return one row per run: record and model, residual, figure 7, or the panels of a forced run.
-
-    More than :data:`ALL` runs are summarised in one panel, and only :data:`CHOSEN` of them have
-    rows.
-    """
+    """Return a row for each run; of many runs one panel of all, and the rows of a few."""
     every = comparison.every
     many = len(every) > ALL
     ranked = sorted(every, key=lambda one: (not one.run.hold_out, -_ratio(one)))
     shown = ranked[:CHOSEN] if many else every
     kinds = ((len(comparison.runs), "free decay"), (len(comparison.forced), "forced run"))
-    said = ", ".join(counted(count, kind) for count, kind in kinds if count)
+    text = ", ".join(counted(count, kind) for count, kind in kinds if count)
     charts = [_row(one, ALONE if len(shown) == 1 else ROW) for one in shown]
     if many:
-        said += f"; below, {len(shown)} of them: held out first, then those missed most"
+        text += f"; below, {len(shown)} of them: held out first, then those missed most"
         charts.insert(0, _overview(every))
-    return Sheet("Model against record", said, [charts], legend=True)
+    return Sheet("Model against record", text, [charts], legend=True)
 
 
 def _ratio(one: Compared) -> float:
@@ -186,21 +182,21 @@ def phase(one: ForcedComparison, *, member: str = "") -> Panel:
 
 def cycles(one: ForcedComparison, title: str, pair: Pair = PAIR) -> Panel:
     """Return the steady state of a record as points, and that of the model as a line."""
-    found, model = one.steady, look(MODEL)
+    result, model = one.steady, look(MODEL)
     marks: list[Mark] = []
     reach, speeds = math.pi, np.zeros(1)
-    if found is not None:
-        every = [cycle for cycle in (found.measured, found.model) if cycle is not None]
+    if result is not None:
+        every = [cycle for cycle in (result.measured, result.model) if cycle is not None]
         speeds = np.concatenate([cycle.velocity for cycle in every])
-        if found.measured.w == 0:
+        if result.measured.w == 0:
             reach = 1.08 * max(float(np.abs(cycle.theta).max()) for cycle in every)
         some = slice(None, None, EVERY)
-        at = plane.wrapped(found.measured.theta)[some], found.measured.velocity[some]
+        at = plane.wrapped(result.measured.theta)[some], result.measured.velocity[some]
         circle: dict[str, Any] = {"fill": "none", "size": 4.0, "edge_width": 0.8}
         marks = [Points(*at, colour=MEASURED, name=pair[0], **circle)]
-        if found.model is not None:
-            theta, velocity = found.model.theta, found.model.velocity
-            theta = np.append(theta, theta[0] + math.tau * found.model.w)
+        if result.model is not None:
+            theta, velocity = result.model.theta, result.model.velocity
+            theta = np.append(theta, theta[0] + math.tau * result.model.w)
             curve = plane.broken_at_wrap(theta, np.append(velocity, velocity[0]))
             marks.append(Line(*curve.T, colour=model.colour, width=1.2, name=pair[1]))
     sides = names.phase_plane((-reach, reach), plane.padded(speeds), _SI)
@@ -208,31 +204,28 @@ def cycles(one: ForcedComparison, title: str, pair: Pair = PAIR) -> Panel:
 
 
 def statistics(one: ForcedComparison) -> Panel:
-    """Return one row per statistic: the ensemble's histogram, and the record's value as a line.
-
-    Events that do not occur before the record's end are hatched at the right.
-    """
+    """Return one row per statistic: the ensemble's histogram, and the record's value as a line."""
     marks: list[Mark] = []
-    for k, each in enumerate(one.statistics):
+    for k, item in enumerate(one.statistics):
         base = k + 1.0
-        own, low, high = (written(each, value, 3) for value in (each.measured, *each.ci95))
-        unit = f" {each.unit}" if each.unit and math.isfinite(each.ci95[0]) else ""
-        said = f"{each.name} {own} ({low if low == high else f'{low} to {high}'}){unit}"
-        marks.append(Text(0.0, base - TALL - 0.07, said, align=("left", "bottom"), size=7.5))
-        marks += _histogram(each, base)
+        mine, low, high = (written(item, value, 3) for value in (item.measured, *item.ci95))
+        unit = f" {item.unit}" if item.unit and math.isfinite(item.ci95[0]) else ""
+        text = f"{item.name} {mine} ({low if low == high else f'{low} to {high}'}){unit}"
+        marks.append(Text(0.0, base - TALL - 0.07, text, align=("left", "bottom"), size=7.5))
+        marks += _histogram(item, base)
     panel = bare("statistics", *marks, high=len(one.statistics))
     return dataclasses.replace(panel, title="record (95 % of the ensemble)")
 
 
-def _histogram(each: Statistic, base: float) -> list[Mark]:
-    known = each.ensemble[np.isfinite(each.ensemble)]
-    ends = np.append(known, each.measured if math.isfinite(each.measured) else known[:0])
+def _histogram(one: Statistic, base: float) -> list[Mark]:
+    known = one.ensemble[np.isfinite(one.ensemble)]
+    ends = np.append(known, one.measured if math.isfinite(one.measured) else known[:0])
     low, high = (float(ends.min()), float(ends.max())) if ends.size else (0.0, 1.0)
     wide = high - low or 1.0
-    whole = not each.unit and wide < BINS
+    whole = not one.unit and wide < BINS
     edges = np.arange(low - 0.5, high + 1) if whole else np.linspace(low, low + wide, BINS + 1)
     counts, edges = np.histogram(known, edges)
-    never = each.ensemble.size - known.size
+    never = one.ensemble.size - known.size
     unit = TALL / max(counts.max(initial=0), never, 1)
     places = 0.9 * (edges - edges[0]) / (edges[-1] - edges[0])
     columns = zip(places[:-1], places[1:], counts, strict=True)
@@ -244,8 +237,8 @@ def _histogram(each: Statistic, base: float) -> list[Mark]:
         marks.append(Areas(last, colour="#ffffff", hatch="////", name=name))
     marks.append(Line(np.array([0.0, 1.0]), np.full(2, base), colour=QUIET, width=0.6))
     at = 0.975
-    if math.isfinite(each.measured):
-        at = 0.9 * (each.measured - edges[0]) / (edges[-1] - edges[0])
+    if math.isfinite(one.measured):
+        at = 0.9 * (one.measured - edges[0]) / (edges[-1] - edges[0])
     up = np.array([base, base - TALL])
     return [*marks, Line(np.full(2, at), up, colour=MEASURED, width=1.6)]
 
@@ -266,12 +259,12 @@ def steady(runs: Sequence[ForcedComparison], title: str, subtitle: str) -> Chart
 
 
 def _reached(one: ForcedComparison) -> str:
-    found = one.steady
-    if found is None:
+    result = one.steady
+    if result is None:
         return "no steady state"
-    if found.model is None:
-        return f"{found.measured.name}, not that of the model"
-    return f"{found.measured.name}, amplitude of the model {100 * found.overestimate:+.2g} %"
+    if result.model is None:
+        return f"{result.measured.name}, not that of the model"
+    return f"{result.measured.name}, amplitude of the model {100 * result.overestimate:+.2g} %"
 
 
 def _drive(one: ForcedComparison) -> str:
@@ -281,10 +274,7 @@ def _drive(one: ForcedComparison) -> str:
 
 
 def tumbling(runs: Sequence[ForcedComparison], title: str, subtitle: str) -> Sheet:
-    """Return histories above, and phase planes and statistics below, for each run.
-
-    A record and a member of the ensemble are drawn side by side, never superposed.
-    """
+    """Return histories above, and phase planes and statistics below, for each run."""
     charts = []
     for one in runs:
         above = [history(one), history(one, member="a member")]

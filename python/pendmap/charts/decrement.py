@@ -36,11 +36,7 @@ REACH: Final = 3.0
 
 @dataclasses.dataclass(frozen=True)
 class Triplets:
-    """Decrements of three successive peaks (eq. 2.7), with the size of the middle peak in rad.
-
-    ``delta`` is NaN if a peak is not smaller than the previous one; its standard error follows from
-    those of the peaks; ``odd`` is true if the first of the three has an odd number.
-    """
+    """Decrements of three successive peaks (eq. 2.7), with the size of the middle peak in rad."""
 
     size: Floats
     delta: Floats
@@ -49,11 +45,7 @@ class Triplets:
 
 
 def triplets_of(peaks: Peaks, zero: float = 0.0) -> Triplets:
-    """Return the triplets of neighbouring peaks, with a zero error (rad) subtracted from angles.
-
-    ``stderr(delta)**2 = [(s_0 / p)**2 + (s_1 (1/p + 1/q))**2 + (s_2 / q)**2] / pi**2`` with the
-    differences ``p`` and ``q`` of the peaks and their standard errors ``s_k``.
-    """
+    """Return the triplets of neighbouring peaks, with a zero error (rad) subtracted from angles."""
     turned = peaks.turned
     size = np.abs(turned.amplitude - zero)
     if size.size < 3:  # noqa: PLR2004
@@ -77,9 +69,11 @@ def _stderr(size: Floats, error: Floats) -> Floats:
 
 def part(report: IdentificationReport) -> Chart:
     """Return absolute and signed decrements, as recorded and without the zero error."""
-    raw, zero, source = triplets_of(report.peaks), _zero(report), _source(report)
+    raw, source = triplets_of(report.peaks), _source(report)
     if not raw.size.size:
         return nothing(TITLE, "Fewer than three peaks in a row.")
+    able = [method for method in report.methods.values() if method.applicable]
+    zero = next((one.estimates["offset"] for one in able if "offset" in one.estimates), None)
     columns = [("as recorded", "", raw, 0.0 if zero is None else zero.value)]
     if zero is not None:
         error = None if zero.stderr is None else 1e3 * zero.stderr
@@ -106,24 +100,13 @@ def part(report: IdentificationReport) -> Chart:
     return Chart(TITLE, "", [panels[0::2], panels[1::2]], size=(8.6, 5.0))
 
 
-def _zero(report: IdentificationReport) -> Estimate | None:
-    """Return the zero error from the first method that estimates it."""
-    able = (found for found in report.methods.values() if found.applicable)
-    return next((found.estimates["offset"] for found in able if "offset" in found.estimates), None)
-
-
 def _source(report: IdentificationReport) -> Identification | None:
-    """Return the first method that estimates frequency, damping and zero, else the first two.
-
-    None is returned if the angle is only approximate.
-    """
-    if report.table.left_out:
-        return None
-    able = [found for found in report.methods.values() if found.applicable]
+    """Return the first method with frequency, damping and zero, else the first two, if any."""
+    able = [method for method in report.methods.values() if method.applicable]
     for wanted in ({"w0", "c_over_m", "offset"}, {"w0", "c_over_m"}):
-        for found in able:
-            if wanted <= set(found.estimates):
-                return found
+        for method in able if not report.table.left_out else ():
+            if wanted <= set(method.estimates):
+                return method
     return None
 
 
@@ -134,9 +117,9 @@ def from_first_peak(rig: Rig, peaks: Peaks, zero: float) -> tuple[State, Floats,
     return begun, *simulated_peaks(rig, begun, float(peaks.turned.time[-1]))
 
 
-def _delta(found: Identification) -> float:
+def _delta(method: Identification) -> float:
     """Return ``zeta / sqrt(1 - zeta^2)`` of an identification."""
-    zeta = found["c_over_m"] / (2 * found["w0"])
+    zeta = method["c_over_m"] / (2 * method["w0"])
     return zeta / math.sqrt(max(1 - zeta**2, 1e-12))
 
 
@@ -166,10 +149,9 @@ def _points(some: Triplets, up: Axis, *, absolute: bool) -> list[Mark]:
         x, y = some.size[which], value[which]
         inside = (y >= low) & (y <= high)
         look: dict[str, Any] = {"colour": colour, "order": 3.0}
-        name = f"from an {'odd' if odd else 'even'} peak"
-        fill = colour if odd else "#ffffff"
-        spots: dict[str, Any] = {"marker": marker, "size": 3.0, "edge_width": 0.8, "name": name}
-        marks.append(Points(x[inside], y[inside], fill=fill, **spots, **look))
+        spots: dict[str, Any] = {"marker": marker, "size": 3.0, "edge_width": 0.8}
+        spots |= {"name": f"from an {'odd' if odd else 'even'} peak"} | look
+        marks.append(Points(x[inside], y[inside], fill=colour if odd else "#ffffff", **spots))
         for beyond, edge, arrow in ((y > high, high, "^"), (y < low, low, "v")):
             at = np.full(int(beyond.sum()), edge)
             marks.append(Points(x[beyond], at, marker=arrow, size=3.6, clip=False, **look))

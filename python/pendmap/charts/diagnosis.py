@@ -46,100 +46,100 @@ RANKED: Final = 8  # Number of candidates in the ranking
 SIZE: Final = (8.6, 12.2)  # Width and height of the sheet in inches
 
 
-def sheet(found: Discrepancy) -> Chart:
+def sheet(result: Discrepancy) -> Chart:
     """Return the sheet: residuals, their rms and forecasts, torques, ranking, an effect by run."""
-    rms = found.gap
+    rms = result.gap
     subtitle = (
         f"residual {1e3 * rms.before:.3g} mrad before, {1e3 * rms.after:.3g} after, noise "
         f"{1e3 * rms.noise_floor:.3g};   held out {1e3 * rms.held_out_before:.3g} before, "
         f"{1e3 * rms.held_out_after:.3g} after"
     )
-    rows = [[panel] for panel in residuals(found)]
+    rows = [[panel] for panel in residuals(result)]
     heights = [0.62] * len(rows)
-    gap = [by_run(found)]
-    if found.forecasts:
-        gap.append(forecast(found, max(found.forecasts, key=lambda one: one.starts)))
-    rows += [gap, [torque(found, "angle"), torque(found, "velocity")]]
-    shown = shown_coefficients(found)[:1]
+    gap = [by_run(result)]
+    if result.forecasts:
+        gap.append(forecast(result, max(result.forecasts, key=lambda one: one.starts)))
+    rows += [gap, [torque(result, "angle"), torque(result, "velocity")]]
+    shown = shown_coefficients(result)[:1]
     # A single run cannot be compared with others.
-    last = coefficients(found, shown[0]) if shown else torque(found, "amplitude")
-    rows.append([ranking(found), last])
+    last = coefficients(result, shown[0]) if shown else torque(result, "amplitude")
+    rows.append([ranking(result), last])
     heights += [1.2, 1.2, 1.5]
-    return Chart(_title(found), subtitle, rows, heights=heights, size=SIZE, letters=False)
+    return Chart(_title(result), subtitle, rows, heights=heights, size=SIZE, letters=False)
 
 
-def parts(found: Discrepancy) -> dict[str, Chart]:
+def parts(result: Discrepancy) -> dict[str, Chart]:
     """Return the non-empty charts of a report by the names that it uses."""
-    starts = " and ".join(f"{one.starts} {one.kind}" for one in found.forecasts)
+    starts = " and ".join(f"{one.starts} {one.kind}" for one in result.forecasts)
     forecasts = f"forecasts from {starts} starts on what was held out" if starts else ""
-    gap = [by_run(found), *(forecast(found, one) for one in found.forecasts)]
-    torques = _torques(found)
+    gap = [by_run(result), *(forecast(result, one) for one in result.forecasts)]
+    torques = _torques(result)
     pairs = [torques[k : k + 2] for k in range(0, len(torques), 2)]
-    ranked = [ranking(found)] if found.scores.best() else []
+    ranked = [ranking(result)] if result.scores.best() else []
     by_itself = "what each effect of the library would explain by itself"
-    runs = [coefficients(found, name) for name in shown_coefficients(found)]
+    runs = [coefficients(result, name) for name in shown_coefficients(result)]
     worst = "the runs with the largest residuals of the baseline"
     made = {
-        "residuals": ("Residuals", worst, [[panel] for panel in residuals(found)], 4.2),
+        "residuals": ("Residuals", worst, [[panel] for panel in residuals(result)], 4.2),
         "gap": ("The gap", forecasts, [gap], 3.7),
         "torque": (LACKED, "per moment of inertia; bands: 95 %", pairs, 1.1 + 2.3 * len(pairs)),
         "ranking": ("Ranking", by_itself, [ranked], 3.5),
         "runs": ("Run by run", "bars and band: 95 %", [runs], 3.5),
     }
     return {
-        name: Chart(title, said, rows, size=(SIZE[0], high), letters=False)
-        for name, (title, said, rows, high) in made.items()
+        name: Chart(title, text, rows, size=(SIZE[0], high), letters=False)
+        for name, (title, text, rows, high) in made.items()
         if any(rows)
     }
 
 
-def cycles(found: Discrepancy) -> Sheet | None:
+def cycles(result: Discrepancy) -> Sheet | None:
     """Return the errors of simulated periods and peaks of both models, for each free run."""
-    runs = sorted(found.cycles, key=lambda one: (not one.held_out, -len(one.peaks)))[:CYCLES]
+    runs = sorted(result.cycles, key=lambda one: (not one.held_out, -len(one.peaks)))[:CYCLES]
     charts = []
     for one in runs:
         errors = one.errors
-        if not found.adds:
+        if not result.adds:
             errors = {"baseline": errors["before"]} if "before" in errors else {}
         title = one.name + (", held out" if one.held_out else "")
         charts.append(dataclasses.replace(errors_of(errors, one.peaks, title), size=(8.6, 3.0)))
-    said = "from the first measured peak on"
-    return Sheet("Simulated periods and peaks", said, [charts]) if charts else None
+    text = "from the first measured peak on"
+    return Sheet("Simulated periods and peaks", text, [charts]) if charts else None
 
 
-def _title(found: Discrepancy) -> str:
+def _title(result: Discrepancy) -> str:
     """Return the verdict with its names; for indistinguishable effects with all of them."""
-    alike = {each[0]: each for each in found.equivalent}
-    said = [effect.name for effect in found.effects]
-    if found.verdict == "ambiguous":
-        said = [" or ".join(alike.get(name, [name])) for name in said]
-    between = "; " if found.verdict == "ambiguous" else ", "
-    return f"{found.verdict}: {between.join(said) or 'no effect claimed'}"
+    alike = {one[0]: one for one in result.equivalent}
+    text = [effect.name for effect in result.effects]
+    if result.verdict == "ambiguous":
+        text = [" or ".join(alike.get(name, [name])) for name in text]
+    between = "; " if result.verdict == "ambiguous" else ", "
+    return f"{result.verdict}: {between.join(text) or 'no effect claimed'}"
 
 
-def models(found: Discrepancy) -> list[tuple[str, str]]:
+def models(result: Discrepancy) -> list[tuple[str, str]]:
     """Return names and colours of the models; the baseline alone if no effect was added."""
-    return [("before", BEFORE), ("after", AFTER)] if found.adds else [("baseline", BEFORE)]
+    return [("before", BEFORE), ("after", AFTER)] if result.adds else [("baseline", BEFORE)]
 
 
-def residuals(found: Discrepancy) -> list[Panel]:
+def residuals(result: Discrepancy) -> list[Panel]:
     """Return the residuals of the runs with the worst baseline fit, before and after."""
-    runs = found.data.fitted
-    rows = [row for row in found.gap.by_run if not row.held_out]
+    runs = result.data.fitted
+    rows = [row for row in result.gap.by_run if not row.held_out]
     order = sorted(range(len(runs)), key=lambda k: -rows[k].before / rows[k].noise_floor)[:RUNS]
     longest = max(float(runs[k].time[-1]) for k in order)
     panels = []
     for k in sorted(order):
         run = runs[k]
         interval = float(np.median(np.diff(run.time)))
-        every = max(round(PART * math.tau / (found.base.fitted.fit.model.w0 * interval)), 1)
+        every = max(round(PART * math.tau / (result.base.fitted.fit.model.w0 * interval)), 1)
         time = run.time[::every]
         floor = 2e3 * rows[k].noise_floor / math.sqrt(every)
-        said = "noise, 2 standard errors"
-        marks: list[Mark] = [Span((-floor, floor), axis="y", colour=NOISE, name=said)]
+        text = "noise, 2 standard errors"
+        marks: list[Mark] = [Span((-floor, floor), axis="y", colour=NOISE, name=text)]
         shown = [np.array([-floor, floor])]
-        fits = (found.base.fitted.fit, found.best.fitted.fit)
-        for (name, colour), fit in zip(models(found), fits, strict=False):
+        fits = (result.base.fitted.fit, result.best.fitted.fit)
+        for (name, colour), fit in zip(models(result), fits, strict=False):
             residual = 1e3 * fit.residuals[k]
             if run.trusted is not None:
                 residual = np.where(run.trusted, residual, math.nan)
@@ -167,9 +167,9 @@ def _runs(files: Sequence[str]) -> Axis:
     return Axis("", (-0.6, len(files) - 0.4), ticks=ticks)
 
 
-def by_run(found: Discrepancy) -> Panel:
+def by_run(result: Discrepancy) -> Panel:
     """Return the residual of each run before and after with its noise, held-out runs last."""
-    rows = found.gap.by_run
+    rows = result.gap.by_run
     at = np.arange(len(rows), dtype=float)
     back = [k for k, row in enumerate(rows) if row.held_out]
     noise, before, after = (
@@ -180,7 +180,7 @@ def by_run(found: Discrepancy) -> Panel:
     if back:
         marks.append(Span((back[0] - 0.5, back[-1] + 0.5), colour="#f1f1f1", name="held out"))
     level, ends = bars(noise, at - 0.32, at + 0.32)
-    (first, _), *further = models(found)
+    (first, _), *further = models(result)
     marks += [
         Line(*bars(at, after, before), colour="#bbbbbb", width=1.0, order=1.0),
         Points(at, before, colour=BEFORE, fill="#ffffff", edge_width=1.0, size=5.0, name=first),
@@ -192,12 +192,12 @@ def by_run(found: Discrepancy) -> Panel:
     return Panel("by run", "Residual by run", across, up, marks)
 
 
-def forecast(found: Discrepancy, one: Forecast) -> Panel:
+def forecast(result: Discrepancy, one: Forecast) -> Panel:
     """Return the forecast error against the horizon, with the noise."""
     floor = 1e3 * one.noise_floor
     marks: list[Mark] = [Level(floor, width=1.1, name="noise", path="noise")]
     shown: list[npt.ArrayLike] = [floor]
-    for (name, colour), error in zip(models(found), (one.before, one.after), strict=False):
+    for (name, colour), error in zip(models(result), (one.before, one.after), strict=False):
         path = "before" if name == "baseline" else name
         line = 1e3 * error
         marks.append(Line(one.horizon, line, colour=colour, width=1.4, name=name, path=path))
@@ -209,26 +209,26 @@ def forecast(found: Discrepancy, one: Forecast) -> Panel:
     return Panel(f"forecast {one.kind}", title, across, up, marks, root=root)
 
 
-def _torque_rows(found: Discrepancy, over: str) -> list[list[dict[str, Any]]]:
+def _torque_rows(result: Discrepancy, over: str) -> list[list[dict[str, Any]]]:
     """Return the torque bins of both models; empty if there are none."""
-    torques = (found.torque_before, found.torque_after)
-    both = zip(models(found), torques, strict=False)
+    torques = (result.torque_before, result.torque_after)
+    both = zip(models(result), torques, strict=False)
     rows = [torque.rows.get(over, []) for _, torque in both]
     return rows if any(rows) else []
 
 
-def torque(found: Discrepancy, over: str) -> Panel:
+def torque(result: Discrepancy, over: str) -> Panel:
     """Return the missing torque of both models over one quantity, with 95 % bands."""
     marks: list[Mark] = [Level(0.0, colour=QUIET, path="zero")]
     every: list[dict[str, Any]] = []
     shown = [np.zeros(1)]
-    for (name, colour), own in zip(models(found), _torque_rows(found, over), strict=False):
-        if not own:
+    for (name, colour), mine in zip(models(result), _torque_rows(result, over), strict=False):
+        if not mine:
             continue
-        every += own
+        every += mine
         path = "before" if name == "baseline" else name
-        edges = np.array([own[0]["from"], *(row["to"] for row in own)])
-        value, error = (np.array([row[key] for row in own]) for key in ("torque", "stderr"))
+        edges = np.array([mine[0]["from"], *(row["to"] for row in mine)])
+        value, error = (np.array([row[key] for row in mine]) for key in ("torque", "stderr"))
         low, high, line = (
             np.append(v, v[-1]) for v in (value - Z95 * error, value + Z95 * error, value)
         )
@@ -239,65 +239,58 @@ def torque(found: Discrepancy, over: str) -> Panel:
         shown += [low, high]
     ends = (min(r["from"] for r in every), max(r["to"] for r in every)) if every else (0.0, 1.0)
     along = bool(every) and every[0]["along_motion"]
-    said = "torque along\nthe motion" if along else "torque"
+    text = "torque along\nthe motion" if along else "torque"
     title = f"{LACKED}, over {over.replace('_', ' ')}"
-    up = Axis(f"{said} ({ACCELERATION})", holding(*shown))
+    up = Axis(f"{text} ({ACCELERATION})", holding(*shown))
     return Panel(over, title, Axis(OVER_SAID[over], ends), up, marks, root=f"torque/{over}")
 
 
-def _torques(found: Discrepancy) -> list[Panel]:
+def _torques(result: Discrepancy) -> list[Panel]:
     """Return the missing torque over each quantity that has bins."""
-    return [torque(found, over) for over in OVER_SAID if _torque_rows(found, over)]
+    return [torque(result, over) for over in OVER_SAID if _torque_rows(result, over)]
 
 
-def ranking(found: Discrepancy) -> Panel:
+def ranking(result: Discrepancy) -> Panel:
     """Return the greatest scores at the baseline, with the effects found in colour."""
-    best = [found.scores.scores[k] for k in found.scores.best()[:RANKED]]
-    level = found.base.fitted.noise.level
+    best = [result.scores.scores[k] for k in result.scores.best()[:RANKED]]
+    level = result.base.fitted.noise.level
     values = [max(score.gain / level, 0.1) for score in best]
-    said = {AFTER: "found", ALIKE: "indistinguishable from it", OTHER: "not accepted"}
+    words = {AFTER: "found", ALIKE: "indistinguishable from it", OTHER: "not accepted"}
     boxes: dict[str, list[Floats]] = {}
     ticks = []
     for place, (score, value) in enumerate(zip(best, values, strict=True)):
         y = float(len(best) - 1 - place)
         name = score.candidate.name
         ticks.append((y, name))
-        colour = ALIKE if any(name in each for each in found.equivalent) else OTHER
-        colour = AFTER if name in {effect.name for effect in found.effects} else colour
+        colour = ALIKE if any(name in one for one in result.equivalent) else OTHER
+        colour = AFTER if name in {effect.name for effect in result.effects} else colour
         corners = [(1.0, y - 0.35), (value, y - 0.35), (value, y + 0.35), (1.0, y + 0.35)]
         boxes.setdefault(colour, []).append(np.array(corners))
-    marks = [Areas(boxes[c], colour=c, name=text) for c, text in said.items() if c in boxes]
+    marks = [Areas(boxes[c], colour=c, name=text) for c, text in words.items() if c in boxes]
     across = Axis("score G", (1.0, max(30.0, 2 * max(values, default=1.0))), "log")
     up = Axis("", (-0.6, max(len(best), 1) - 0.4), ticks=ticks)
     return Panel("ranking", "Candidates at the baseline", across, up, marks)
 
 
-def shown_coefficients(found: Discrepancy) -> list[str]:
-    """Return the parameters that are drawn run by run: the sizes of the effects found.
-
-    If no effect was found, it is the parameter that differs most between runs, over its errors. A
-    single run cannot be compared with others.
-    """
-    if len(found.data.fitted) == 1:
+def shown_coefficients(result: Discrepancy) -> list[str]:
+    """Return the parameters that are drawn run by run: the sizes of the effects found."""
+    if len(result.data.fitted) == 1:
         return []
-    sizes = [standing.candidate.free[0] for standing in found.assessment.identified]
-    known = [name for name in ("c_over_m", "w0", "Tr") if name in found.runs.coefficients]
+    sizes = [standing.candidate.free[0] for standing in result.assessment.identified]
+    known = [name for name in ("c_over_m", "w0", "Tr") if name in result.runs.coefficients]
 
     def apart(name: str) -> float:
-        errors = [error for _, error in found.runs.shown(name)]
-        return found.runs.between(name) / min(errors, default=math.inf)
+        errors = [error for _, error in result.runs.shown(name)]
+        return result.runs.between(name) / min(errors, default=math.inf)
 
     return sizes or ([max(known, key=apart)] if known else [])
 
 
-def _together(found: Discrepancy, shown: str) -> tuple[float, float]:
-    """Return the 95 % interval of a parameter from all runs together.
-
-    It is that of the effect found; without a claimed effect it follows from the standard error.
-    """
-    trial = found.nearest.fitted
+def _together(result: Discrepancy, shown: str) -> tuple[float, float]:
+    """Return the 95 % interval of a parameter from all runs together."""
+    trial = result.nearest.fitted
     estimate = trial.fit.estimates[shown]
-    for standing, effect in zip(found.assessment.identified, found.effects, strict=False):
+    for standing, effect in zip(result.assessment.identified, result.effects, strict=False):
         bounds = effect.ci95.get(standing.candidate.size)
         if standing.candidate.free[0] == shown and bounds is not None:
             # A negative size may be stated as a positive one, with the phase shifted by pi.
@@ -307,37 +300,37 @@ def _together(found: Discrepancy, shown: str) -> tuple[float, float]:
     return estimate.value - half, estimate.value + half
 
 
-def _reach(found: Discrepancy, shown: str) -> tuple[float, float]:
+def _reach(result: Discrepancy, shown: str) -> tuple[float, float]:
     """Return the limits of the axis; a run that hardly determines the effect is cut off."""
-    mean = found.nearest.fitted.fit.estimates[shown].value
-    known = [(v, e) for v, e in found.runs.coefficients[shown] if math.isfinite(e)]
+    mean = result.nearest.fitted.fit.estimates[shown].value
+    known = [(v, e) for v, e in result.runs.coefficients[shown] if math.isfinite(e)]
     errors = sorted(e for _, e in known)
     reach = 6 * errors[len(errors) // 2] if errors else 0.0
     spread = max((abs(v - mean) for v, e in known if e < reach), default=0.0)
-    wide = max(abs(end - mean) for end in _together(found, shown))
+    wide = max(abs(end - mean) for end in _together(result, shown))
     half = max(1.4 * spread, reach, 1.5 * wide) or 1.0
     return mean - half, mean + half
 
 
-def coefficients(found: Discrepancy, shown: str) -> Panel:
+def coefficients(result: Discrepancy, shown: str) -> Panel:
     """Return the value of a parameter from each run, and from all runs together."""
-    pairs = found.runs.coefficients[shown]
-    mean = found.nearest.fitted.fit.estimates[shown].value
+    pairs = result.runs.coefficients[shown]
+    mean = result.nearest.fitted.fit.estimates[shown].value
     power = 3 * math.floor(math.log10(abs(mean)) / 3) if mean else 0
     scale = 10.0**-power
     at = np.arange(len(pairs), dtype=float)
     value, error = (scale * np.array([pair[k] for pair in pairs]) for k in (0, 1))
     known = np.isfinite(error)
-    low, high = (scale * end for end in _reach(found, shown))
+    low, high = (scale * end for end in _reach(result, shown))
     least, most = value - Z95 * error, value + Z95 * error
-    together = [scale * end for end in _together(found, shown)]
+    together = [scale * end for end in _together(result, shown)]
     marks: list[Mark] = [
         Span(together, axis="y", colour=NOISE, name="all together"),
         Line(*bars(at[known], least[known], most[known]), colour=AFTER, width=1.0),
         Points(at[known], value[known], marker="s", size=4.0, colour=AFTER, name="own value"),
     ]
     inner = high - low
-    for which, place, mark, said in (
+    for which, place, mark, text in (
         (known & (most > high), high - 0.03 * inner, "^", "beyond the axis"),
         (known & (least < low), low + 0.03 * inner, "v", "beyond the axis"),
         (~known, low + 0.06 * inner, "x", "undetectable"),
@@ -346,11 +339,11 @@ def coefficients(found: Discrepancy, shown: str) -> Panel:
         if x.size:
             spots = np.full(x.size, place)
             cross: dict[str, Any] = {"marker": mark, "size": 4.5, "edge_width": 1.0}
-            marks.append(Points(x, spots, colour=QUIET, name=said, **cross))
+            marks.append(Points(x, spots, colour=QUIET, name=text, **cross))
     times = f"$10^{{{power}}}$ " if power else ""
-    unit = f"{times}{unit_of(shown, found.definition)}".strip()
-    own = shown.rpartition(".")[2]
-    claimed = "" if found.effects else " (not claimed)"
-    up = Axis(f"{own} ({unit})" if unit else own, (low, high))
-    across = _runs([run.name for run in found.data.fitted])
+    unit = f"{times}{unit_of(shown, result.definition)}".strip()
+    mine = shown.rpartition(".")[2]
+    claimed = "" if result.effects else " (not claimed)"
+    up = Axis(f"{mine} ({unit})" if unit else mine, (low, high))
+    across = _runs([run.name for run in result.data.fitted])
     return Panel(f"run by run {shown}", f"{shown}{claimed}", across, up, marks)

@@ -10,7 +10,7 @@ import numpy as np
 
 from pendmap.charts import names
 from pendmap.charts.chart import Axis, Chart, Panel, holding
-from pendmap.charts.marks import NONE, QUIET, ZERO, Areas, Level, Line, Mark, Points, bars
+from pendmap.charts.marks import NONE, ZERO, Areas, Line, Mark, Points, bars
 from pendmap.charts.methods import EVEN, MEASURED, ODD
 from pendmap.charts.record import UNUSED
 from pendmap.formatting import typographic
@@ -20,7 +20,7 @@ from pendmap.units import Units
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from pendmap.charts.marks import Floats
+    from pendmap.charts.marks import Ends, Floats
     from pendmap.identification import IdentificationReport, Peaks
     from pendmap.records import Run
 
@@ -32,10 +32,7 @@ SPAN: Final = 0.2  # Half width of the stretch of a cubic fit, over the length o
 
 @dataclasses.dataclass(frozen=True)
 class Course:
-    """A record relative to the turn in which it comes to rest.
-
-    Samples for fitting (s, rad), the half cycle of each, -1 if in none; all other samples.
-    """
+    """A record relative to the turn in which it comes to rest."""
 
     time: Floats
     theta: Floats
@@ -75,12 +72,13 @@ def part(report: IdentificationReport) -> Chart:
     if few:
         return Chart(TITLE, "", [[whole]], size=(8.6, 2.4))
     spans = first_and_last(peaks)
-    said = ["the first half cycles", "the last half cycles"] if len(spans) > 1 else ["all of them"]
-    columns = [_near(report, course, *one) for one in zip(said, spans, strict=True)]
+    titles = ["the first half cycles", "the last half cycles"][: len(spans)]
+    titles = titles if len(spans) > 1 else ["all of them"]
+    columns = [_near(report, course, *one) for one in zip(titles, spans, strict=True)]
+    # Peaks alone have no velocity.
+    middle, last, high = ([1.0], 0.35, 4.6) if run.peaks_only else ([1.0, 0.8], 0.28, 5.6)
     rows = [[whole], *zip(*columns, strict=True)]
-    if run.peaks_only:
-        return Chart(TITLE, "", rows, heights=(1.1, 1.0, 0.35), size=(8.6, 4.6))
-    return Chart(TITLE, "", rows, heights=(1.1, 1.0, 0.8, 0.28), size=(8.6, 5.6))
+    return Chart(TITLE, "", rows, heights=(1.1, *middle, last), size=(8.6, high))
 
 
 def _whole(course: Course, peaks: Peaks, *, thin: bool) -> Panel:
@@ -105,21 +103,20 @@ def _whole(course: Course, peaks: Peaks, *, thin: bool) -> Panel:
     return Panel("whole", title, clock, names.angle(holding(theta)), marks)
 
 
-def _near(
-    report: IdentificationReport, course: Course, title: str, span: tuple[float, float]
-) -> list[Panel]:
+def _near(report: IdentificationReport, course: Course, title: str, span: Ends) -> list[Panel]:
     """Return angle, velocity and its sign over a span, from top to bottom."""
     run, peaks = report.run, report.peaks
     ends = holding(span, margin=0.02)
-    clock, bare = Axis(names.TIME, ends), Axis("", ends, ticks=())
+    bare = Axis("", ends, ticks=())
     angle, values = _angle(course, peaks, ends, only=run.peaks_only)
     panels = [Panel("angle", title, bare, names.angle(holding(values)), angle)]
     if not run.peaks_only:
-        velocity, values = _velocity(run, course, peaks, ends)
-        up = names.angle(holding(values), names.speed(Units(si=True)))
-        panels.append(Panel("velocity", "", bare, up, velocity))
+        time, half, speed = _velocity(run, course, peaks, ends)
+        up = names.angle(holding(speed), names.speed(Units(si=True)))
+        marks = [*_coloured(time, speed, half, 1.1), ZERO]
+        panels.append(Panel("velocity", "", bare, up, marks))
     signs = Axis("sign", (-1.35, 1.35), ticks=[(-1, typographic("-1")), (0, "0"), (1, "1")])
-    return [*panels, Panel("sign", "", clock, signs, _sign(peaks))]
+    return [*panels, Panel("sign", "", Axis(names.TIME, ends), signs, _sign(peaks))]
 
 
 def _coloured(time: Floats, values: Floats, half: NDArray[np.int64], width: float) -> list[Mark]:
@@ -150,19 +147,19 @@ def _peaks(peaks: Peaks, size: float, *, by_parity: bool = False) -> list[Mark]:
     ]
 
 
-def _angle(
-    course: Course, peaks: Peaks, ends: tuple[float, float], *, only: bool
-) -> tuple[list[Mark], Floats]:
+def _within(time: Floats, ends: Ends) -> NDArray[np.bool_]:
+    return (time >= ends[0]) & (time <= ends[1])
+
+
+def _angle(course: Course, peaks: Peaks, ends: Ends, *, only: bool) -> tuple[list[Mark], Floats]:
     """Return the angle with its peaks, their 95 % intervals and zero crossings, and all angles."""
-    near = (course.time >= ends[0]) & (course.time <= ends[1])
-    some = peaks.select((peaks.time >= ends[0]) & (peaks.time <= ends[1]))
-    known = some.select(np.isfinite(some.stderr_amplitude))
-    wide = Z95 * known.stderr_amplitude
-    cross = peaks.crossing_time[(peaks.crossing_time >= ends[0]) & (peaks.crossing_time <= ends[1])]
+    near, some = _within(course.time, ends), peaks.select(_within(peaks.time, ends))
+    wide = Z95 * some.stderr_amplitude
+    cross = peaks.crossing_time[_within(peaks.crossing_time, ends)]
     marks: list[Mark] = []
     if not only:
         marks += _coloured(course.time[near], course.theta[near], course.half[near], 1.1)
-    lines = bars(known.time, known.amplitude - wide, known.amplitude + wide)
+    lines = bars(some.time, some.amplitude - wide, some.amplitude + wide)
     marks += [
         Line(*lines, colour=MEASURED, width=0.8, order=3.0),
         *_peaks(some, 4.5, by_parity=only),
@@ -173,40 +170,32 @@ def _angle(
 
 
 def _velocity(
-    run: Run, course: Course, peaks: Peaks, ends: tuple[float, float]
-) -> tuple[list[Mark], Floats]:
-    """Return the measured velocity, or else the slopes of cubics fitted to the samples."""
-    near = (course.time >= ends[0]) & (course.time <= ends[1])
+    run: Run, course: Course, peaks: Peaks, ends: Ends
+) -> tuple[Floats, NDArray[np.int64], Floats]:
+    """Return times, half cycles, and the measured velocity or else slopes of cubics."""
+    near = _within(course.time, ends)
     time, half = course.time[near], course.half[near]
     if run.velocity is not None:
-        speed = run.velocity[run.trusted][near]
-    else:
-        every = max(1, time.size // POINTS)
-        time, half = time[::every], half[::every]
-        within = (peaks.time >= ends[0]) & (peaks.time <= ends[1])
-        # A cubic needs five samples, also where the record has few to a half cycle.
-        least = 2.5 * float(np.median(np.diff(course.time)))
-        reach = max(SPAN * float(np.median(np.diff(peaks.time[within]))), least)
-        speed = _slopes(course, time, reach)
-    return [*_coloured(time, speed, half, 1.1), ZERO], speed
-
-
-def _slopes(course: Course, at: Floats, reach: float) -> Floats:
-    """Return the slope at the centre of a cubic fitted to samples within ``reach``, rad/s."""
-    result = np.full(at.size, math.nan)
-    low = np.searchsorted(course.time, at - reach)
-    high = np.searchsorted(course.time, at + reach, side="right")
+        return time, half, run.velocity[run.trusted][near]
+    every = max(1, time.size // POINTS)
+    time, half = time[::every], half[::every]
+    # A cubic needs five samples, also where the record has few to a half cycle.
+    least = 2.5 * float(np.median(np.diff(course.time)))
+    reach = max(SPAN * float(np.median(np.diff(peaks.time[_within(peaks.time, ends)]))), least)
+    speed = np.full(time.size, math.nan)
+    low = np.searchsorted(course.time, time - reach)
+    high = np.searchsorted(course.time, time + reach, side="right")
     for k, (a, b) in enumerate(zip(low, high, strict=True)):
         if b - a >= 5:  # noqa: PLR2004 (one more than a cubic has)
-            scaled = (course.time[a:b] - at[k]) / reach
+            scaled = (course.time[a:b] - time[k]) / reach
             powers = np.vander(scaled, 4, increasing=True)
-            result[k] = np.linalg.lstsq(powers, course.theta[a:b], rcond=None)[0][1] / reach
-    return result
+            speed[k] = np.linalg.lstsq(powers, course.theta[a:b], rcond=None)[0][1] / reach
+    return time, half, speed
 
 
 def _sign(peaks: Peaks) -> list[Mark]:
     """Return the sign of the velocity, that of the change from each peak to the next."""
-    marks: list[Mark] = [Level(0.0, colour=QUIET, width=0.6)]
+    marks: list[Mark] = [ZERO]
     for parity, colour in ((0, EVEN), (1, ODD)):
         whole = np.flatnonzero((np.diff(peaks.index) == 1) & (peaks.index[:-1] % 2 == parity))
         sign = np.sign(peaks.amplitude[whole + 1] - peaks.amplitude[whole])

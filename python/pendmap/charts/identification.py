@@ -17,6 +17,7 @@ from pendmap.charts.methods import MEASURED, NOISE, NOISE_SAID, drawn, look, not
 from pendmap.errors import InputError
 from pendmap.formatting import estimate_text, typographic
 from pendmap.identification.methods.registry import BEST
+from pendmap.identification.report import table1_table
 from pendmap.signal.robust import Z95, span
 
 if TYPE_CHECKING:
@@ -59,27 +60,23 @@ def sheet(
         charts = [dataclasses.replace(charts[0], title="")]
     columns = [charts]
     if len(charts) > 2:  # noqa: PLR2004
-        cuts = ((charts[:k], charts[k:]) for k in range(1, len(charts)))
-        columns = list(min(cuts, key=lambda both: max(map(_high, both))))
-    said = _said(report) if subtitle is None else subtitle
-    return Sheet(title or f"Identification: {report.run.name}", said, columns)
-
-
-def _high(column: Sequence[Chart]) -> float:
-    return sum(chart.size[1] for chart in column if chart.size)
-
-
-def _said(report: IdentificationReport) -> str:
-    """Return a line about the measured record."""
+        high = np.cumsum([0.0, *(chart.size[1] for chart in charts if chart.size)])
+        k = min(range(1, len(charts)), key=lambda k: max(high[k], high[-1] - high[k]))
+        columns = [charts[:k], charts[k:]]
     run, peaks = report.run, report.peaks
-    if run.peaks_only:
-        return f"{len(peaks)} peaks, {span(run.time)}"
-    noise = f"noise {peaks.sigma:.2g} rad" if peaks.sigma else "no noise seen"
-    if len(report.runs) > 1:
-        fitted = f"fitted to {len(report.runs)} runs; drawn: {run.name}, the longest"
-        return f"{fitted};   {span(run.time)}, {len(peaks)} peaks, {noise}"
+    noise = (
+        f"{len(peaks)} peaks, {f'noise {peaks.sigma:.2g} rad' if peaks.sigma else 'no noise seen'}"
+    )
     used = f"{run.trusted.sum()} of {run.time.size} samples for fitting"
-    return f"{run.rate_hz:.5g} Hz, {span(run.time)}, {used};   {len(peaks)} peaks, {noise}"
+    text = f"{run.rate_hz:.5g} Hz, {span(run.time)}, {used};   {noise}"
+    if run.peaks_only:
+        text = f"{len(peaks)} peaks, {span(run.time)}"
+    elif len(report.runs) > 1:
+        fitted = f"fitted to {len(report.runs)} runs; drawn: {run.name}, the longest"
+        text = f"{fitted};   {span(run.time)}, {noise}"
+    return Sheet(
+        title or f"Identification: {run.name}", text if subtitle is None else subtitle, columns
+    )
 
 
 # Decay of each model with the measured one: figure 6.
@@ -110,11 +107,11 @@ def simulated(report: IdentificationReport) -> dict[str, Decay]:
         return {}
     made = {}
     for name in drawn(report.methods):
-        found = report.methods[name]
-        if not found.applicable or "w0" not in found.estimates or name in report.table.lost:
+        result = report.methods[name]
+        if not result.applicable or "w0" not in result.estimates or name in report.table.lost:
             continue
-        rig = report.joint.fit.model if name == BEST and report.joint is not None else found.rig
-        made[name] = Decay.of(rig, report.peaks, found.zero)
+        rig = report.joint.fit.model if name == BEST and report.joint is not None else result.rig
+        made[name] = Decay.of(rig, report.peaks, result.zero)
     return made
 
 
@@ -129,8 +126,8 @@ def decays(report: IdentificationReport) -> Chart:
     made, run, turned = simulated(report), report.run, report.peaks.turned
     last = []
     if (joint := report.joint) is not None:
-        said, sigma = "the record less the trajectory fitted to it", joint.readings[0].sigma
-        last = [residuals(run, joint.fit.residuals[0], sigma, BEST, said)]
+        text, sigma = "the record less the trajectory fitted to it", joint.readings[0].sigma
+        last = [residuals(run, joint.fit.residuals[0], sigma, BEST, text)]
     if not made:
         chart = nothing(title, report.table.left_out or NOTHING)
         if not (report.table.left_out and last):
@@ -202,10 +199,7 @@ def _near(
 
 
 def residuals(run: Run, residual: Floats, sigma: float, method: str, title: str) -> Panel:
-    """Return the residuals of a model over a record, with lines at the standard deviation.
-
-    For a gyroscope they are residuals of its rate.
-    """
+    """Return the residuals of a model over a record, with lines at the standard deviation."""
     gyroscope = run.gyroscope
     size, unit = (1e3, "mrad") if gyroscope is None else (1e3 * gyroscope.gain, "mrad/s")
     away = size * np.where(run.trusted, residual, np.nan)
@@ -252,72 +246,52 @@ def error_panels(
     ends = (max(float(np.min(some.peak[1:])), 1e-9) / 1.15, float(np.max(some.peak[1:])) * 1.15)
     size = Axis("measured peak |θ| (rad)", ends, "log")
     time = Axis(names.TIME, holding(some.period_time, margin=0.02))
-    periods = [(each.period_time, each.period_error) for each in known.values()]
-    sizes = [(each.peak[1:], each.peak_error[1:]) for each in known.values()]
+    periods = [(one.period_time, one.period_error) for one in known.values()]
+    sizes = [(one.peak[1:], one.peak_error[1:]) for one in known.values()]
     panels: list[Panel] = []
     for title, across, noise, curves in (
         (titles[0], time, _noise(some.period_time, error), periods),
         (titles[1], size, _noise(some.peak[order], wide), sizes),
     ):
         up, lines = names.signed([y for _, y in curves], "error (%)")
-        own = [_line(*curve, method, 1.1) for method, curve in zip(known, curves, strict=True)]
-        panels.append(Panel("errors", title, across, up, [*noise, *own, *lines]))
+        mine = [_line(*curve, method, 1.1) for method, curve in zip(known, curves, strict=True)]
+        panels.append(Panel("errors", title, across, up, [*noise, *mine, *lines]))
     return panels
 
 
 # Table 1.
 
 
-def columns(report: IdentificationReport) -> list[str]:
-    """Return the column names of table 1."""
-    units = {"period": "s", "peak": "rad"}
-    measured = [f"{row.what} {row.measured:.3g} {units[row.what]}" for row in report.table.rows]
-    overall = [] if report.table.left_out else ["periods, rms", "peaks, rms"]
-    return ["method", *QUANTITIES.values(), *measured, *overall]
-
-
-def rows(report: IdentificationReport) -> list[list[str]]:
-    """Return a row for each applicable method; absolute errors in percent."""
-    made, dash = [], "\N{EN DASH}"
-    for name, found in report.methods.items():
-        if not found.applicable:
-            continue
-        known = [found.estimates.get(key) for key in QUANTITIES]
-        cells = [dash if one is None else typographic(estimate_text(one)) for one in known]
-        cells += [_percent(row.errors.get(name, math.nan)) for row in report.table.rows]
-        if not report.table.left_out:
-            errors = report.table.errors.get(name)
-            overall = () if errors is None else (errors.period_rms, errors.peak_rms)
-            cells += [_percent(error) for error in overall] or [dash, dash]
-        made.append([look(name).label, *cells])
-    return made
-
-
-def _percent(value: float) -> str:
-    """Return three digits without an exponent, or a note that the simulation is at rest."""
-    if math.isnan(value):
-        return RESTS
-    return f"{value:.0f}" if value >= 100 else f"{value:.3g}"  # noqa: PLR2004
-
-
 def table(report: IdentificationReport) -> Chart:
     """Return table 1 of a record, and below it the inapplicable methods with the reason."""
-    head = [name.replace(" ", "\n", 1) if " " in name else f"\n{name}" for name in columns(report)]
-    body = rows(report)
-    notes = ["in brackets: standard error of the last digits"] if body else []
+    head, errors = table1_table(report)
+    heads = [] if report.table.left_out else head[1:]
+    dash, of_method = "\N{EN DASH}", {name: cells for name, *cells in errors}
+    body, notes, reasons = [], [], []
+    for name, method in report.methods.items():
+        label = look(name).label
+        if not method.applicable:
+            why = method.warnings[-1] if method.warnings else "not applicable"
+            reasons += textwrap.wrap(f"{label}: {why}", LETTERS, subsequent_indent="    ")
+            continue
+        known = [method.estimates.get(key) for key in QUANTITIES]
+        cells = [dash if one is None else typographic(estimate_text(one)) for one in known]
+        cells += [cell.removesuffix(" %") for cell in of_method.get(name, [dash] * len(heads))]
+        body.append([label, *cells])
+    if body:
+        notes = ["in brackets: standard error of the last digits"]
     if any(RESTS in row for row in body):
         notes[0] += f";   {RESTS}: the simulation stands still by then"
-    for name, found in report.methods.items():
-        if not found.applicable:
-            why = found.warnings[-1] if found.warnings else "not applicable"
-            notes += textwrap.wrap(f"{look(name).label}: {why}", LETTERS, subsequent_indent="    ")
+    notes += reasons
     down = 2.5 + len(body)
     words = [
         Text(0.0, down + k, text, colour=QUIET, align=("left", "bottom"), size=8.0)
         for k, text in enumerate(notes)
     ]
     high = down + len(notes) - 0.9
-    panel = bare("table", Table(head, body), *words, high=high)
+    heads = ["method", *QUANTITIES.values(), *heads]
+    heads = [name.replace(" ", "\n", 1) if " " in name else f"\n{name}" for name in heads]
+    panel = bare("table", Table(heads, body), *words, high=high)
     title = "Damping by each method, and errors of its simulation (%)"
     return Chart(title, "", [[panel]], size=(WIDTH, 0.55 + LINE * high))
 

@@ -44,41 +44,44 @@ class Curve:
 def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> Chart:
     """Return survival curves with the fitted tail, and the mean time left by start of the tail."""
     del cells
-    panels = [_survival(dataset)]
+    panels, a = [_survival(dataset)], facts(dataset)
     if dataset.sizes["tail_begin"] > 1:
         panels.append(_tail(dataset))
-    starts = counted(int(dataset.attrs["starts"]), "start")
-    subtitle = f"{names.parameters(facts(dataset))};   {starts}"
+    if a["persistent"]:
+        title = f"Persistent chaos: {typeset(str(dataset['attractor'].values[0]))}"
+    elif a["transient_chaos"]:
+        mean = written(float(a["mean_periods"]), float(a["mean_periods_stderr"]))
+        title = f"Transient chaos: lives {mean} periods on average"
+    else:
+        decided = math.isfinite(a["escape_rate"]) or a["captured_starts"]
+        title = "No transient chaos" if decided else "Undecided"
+    subtitle = f"{names.parameters(a)};   {counted(int(dataset.attrs['starts']), 'start')}"
     size = (9.6 if len(panels) > 1 else 6.0, 4.6)
-    return Chart(_title(dataset), subtitle, [panels], size=size).only(layer, (6.0, 4.6))
+    return Chart(title, subtitle, [panels], size=size).only(layer, (6.0, 4.6))
 
 
 def curves(dataset: xr.Dataset) -> list[Curve]:
-    """Return the curve of all starts, then of each attractor that captured any.
-
-    Curves of single attractors are left out if the bound cut many trajectories off.
-    """
+    """Return the curve of all starts, and of each attractor unless the bound cut many off."""
     periods = dataset["elapsed"].values.astype(float)
     captured = dataset["captured"].values
     a = facts(dataset)
     starts = int(a["starts"])
     if a["persistent"]:
         return [Curve("", INK, np.array([0.0, float(a["chaos_bound"])]), np.ones(2))]
+
+    def shares(count: npt.NDArray[np.int64]) -> Floats:
+        return np.where(count > 0, count / starts, np.nan)
+
     lasting = round(float(a["chaotic_share"]) * starts)
     everything = starts - int(a["failed"]) - lasting - captured.sum(axis=0)
     total = np.rint(dataset["fraction"].values * starts).astype(np.int64)
-    made = [Curve("", INK, periods, _shares(everything, starts))]
+    made = [Curve("", INK, periods, shares(everything))]
     whole = int(a["censored"]) <= FEW * starts
     names, colours = dataset["attractor"].values, colours_of(dataset)
     for k in np.flatnonzero(captured.any(axis=1)) if whole else ():
-        alive = _shares(total[k] - captured[k], starts)
+        alive = shares(total[k] - captured[k])
         made.append(Curve(str(names[k]), palette.on_white(colours[k]), periods, alive))
     return made
-
-
-def _shares(count: npt.NDArray[np.int64], starts: int) -> Floats:
-    share = count / starts
-    return np.where(share > 0, share, np.nan)
 
 
 def _fit(dataset: xr.Dataset, whole: Curve) -> list[Mark]:
@@ -99,8 +102,8 @@ def _fit(dataset: xr.Dataset, whole: Curve) -> list[Mark]:
         first * np.exp((periods - begin) * np.log1p(-1 / max(mean + way * SIGMAS * error, 1.01)))
         for way in (-1, 0, 1)
     )
-    said = typographic(with_error(mean, error))
-    text = f"tail from period {a['from_period']}: mean lifetime {said} periods"
+    life = typographic(with_error(mean, error))
+    text = f"tail from period {a['from_period']}: mean lifetime {life} periods"
     return [
         Band(periods, low, high, colour=_BAND, name=text, path="band", order=1.0),
         Line(periods, share, colour=_FIT, width=1.4, name=text, path="tail", order=5.0),
@@ -108,26 +111,12 @@ def _fit(dataset: xr.Dataset, whole: Curve) -> list[Mark]:
     ]
 
 
-def _title(dataset: xr.Dataset) -> str:
-    a = facts(dataset)
-    if a["persistent"]:
-        return f"Persistent chaos: {typeset(str(dataset['attractor'].values[0]))}"
-    if a["transient_chaos"]:
-        mean, error = float(a["mean_periods"]), float(a["mean_periods_stderr"])
-        return f"Transient chaos: lives {written(mean, error)} periods on average"
-    return (
-        "No transient chaos"
-        if math.isfinite(a["escape_rate"]) or a["captured_starts"]
-        else "Undecided"
-    )
-
-
 def _survival(dataset: xr.Dataset) -> Panel:
     every = curves(dataset)
     marks: list[Mark] = []
     for k, one in enumerate(every):
-        said = f"those that {typeset(one.name)} captures" if one.name else "all starts"
-        look: dict[str, Any] = {"name": said, "path": str(k), "colour": one.colour}
+        text = f"those that {typeset(one.name)} captures" if one.name else "all starts"
+        look: dict[str, Any] = {"name": text, "path": str(k), "colour": one.colour}
         look |= {"width": 1.3 if one.name else 1.8, "dash": _DASHES[k % 4]}
         marks.append(Line(one.periods, one.share, step=True, **look))
     marks += _fit(dataset, every[0])
@@ -154,11 +143,13 @@ def _tail(dataset: xr.Dataset) -> Panel:
         ]
     rough = chance <= _LEAST_SIGNIFICANT
     spots: dict[str, Any] = {"size": 4.0, "edge": INK, "edge_width": 0.8, "order": 3.0}
-    said = "from here on exponential, with standard error"
-    not_so = "not exponential at the 5 % level"
+    good, not_so = (
+        "from here on exponential, with standard error",
+        "not exponential at the 5 % level",
+    )
     marks += [
         Line(*bars(begin, mean - error, mean + error), colour=QUIET, width=0.8, path="error"),
-        Points(begin, mean, name=said, path="mean", **spots),
+        Points(begin, mean, name=good, path="mean", **spots),
         Points(begin[rough], mean[rough], fill="#ffffff", name=not_so, **spots),
     ]
     precise = error < np.maximum(0.25 * mean, 1e-9)

@@ -13,7 +13,6 @@ from pendmap.charts.chart import Axis, Chart, Panel, holding
 from pendmap.charts.legend import colours_of, typeset
 from pendmap.charts.marks import (
     DASHED,
-    INK,
     NONE,
     QUIET,
     ZERO,
@@ -48,37 +47,26 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     else:
         panels.append(_sliding(dataset))
     attractor = [_attractor(dataset)] if dataset.sizes["point"] else []
-    title, subtitle = _title(dataset), names.with_start(facts(dataset))
-    look: dict[str, Any] = {"recorded": [*panels, *attractor], "size": (_WIDTHS[len(panels)], 4.3)}
-    return Chart(title, subtitle, [panels], **look).only(layer, (_WIDTHS[1], 4.3))
-
-
-def _title(dataset: xr.Dataset) -> str:
-    head = "Largest Lyapunov exponent"
-    if dataset.sizes["attractor"]:
-        return f"{head}: {typeset(str(dataset['attractor'].values[0]))}"
-    words = {
+    ends = {
         "undamped": "motion without damping",
         "undecided": "undecided",
         "failed": "the motion leaves the range of numbers",
     }
-    return f"{head}: {words[str(dataset['end'].item())]}"
+    end = ends.get(str(dataset["end"].item()), "")
+    of = typeset(str(dataset["attractor"].values[0])) if dataset.sizes["attractor"] else end
+    return Chart(
+        f"Largest Lyapunov exponent: {of}",
+        names.with_start(facts(dataset)),
+        [panels],
+        recorded=[*panels, *attractor],
+        size=(_WIDTHS[len(panels)], 4.3),
+    ).only(layer, (_WIDTHS[1], 4.3))
 
 
-def _value(dataset: xr.Dataset) -> str:
-    """Return the exponent with its error and unit, or an empty string."""
-    a = facts(dataset)
-    exponent, error = float(a["largest_exponent"]), float(a["largest_exponent_stderr"])
-    if not math.isfinite(exponent):
-        return ""
-    said = typographic(with_error(exponent, error))
-    return f"λ = {said} {names.per_time(Units.of(a))}"
-
-
-def _elapsed(dataset: xr.Dataset) -> tuple[float, float]:
-    """Return the first and the last period of a curve, which differ by 1 or more."""
-    periods = dataset["elapsed"].values
-    return float(periods[0]), float(max(periods[-1], periods[0] + 1))
+def _clock(dataset: xr.Dataset, name: str) -> Axis:
+    """Return the axis of the periods elapsed."""
+    first, last = dataset["elapsed"].values[[0, -1]]
+    return Axis(f"periods since the start{name}", (float(first), float(max(last, first + 1))))
 
 
 def _rate(dataset: xr.Dataset) -> str:
@@ -87,20 +75,24 @@ def _rate(dataset: xr.Dataset) -> str:
 
 def _transient(dataset: xr.Dataset) -> list[Mark]:
     periods = max(int(dataset["transient_periods"]), 0)
-    said = f"transient, {counted(periods, 'period')}"
-    return [Span((0, periods), colour=_TRANSIENT, name=said), ZERO] if periods else [ZERO]
+    text = f"transient, {counted(periods, 'period')}"
+    return [Span((0, periods), colour=_TRANSIENT, name=text), ZERO] if periods else [ZERO]
 
 
 def _mean_look(dataset: xr.Dataset) -> dict[str, Any]:
-    """Return the look and the name of lines that show the exponent."""
-    return {"colour": _MEAN, "width": 1.6, "dash": DASHED, "name": _value(dataset)}
+    """Return the look of lines that show the exponent; their name is its value with its error."""
+    a, text = facts(dataset), ""
+    exponent, error = float(a["largest_exponent"]), float(a["largest_exponent_stderr"])
+    if math.isfinite(exponent):
+        value = typographic(with_error(exponent, error))
+        text = f"λ = {value} {names.per_time(Units.of(a))}"
+    return {"colour": _MEAN, "width": 1.6, "dash": DASHED, "name": text}
 
 
 def _level(dataset: xr.Dataset, axis: Literal["x", "y"] = "y") -> list[Mark]:
     value = float(dataset["largest_exponent"])
-    known = math.isfinite(value)
-    look = _mean_look(dataset)
-    return [Level(value, axis=axis, order=2.0, path="value", **look)] if known else []
+    level = Level(value, axis=axis, order=2.0, path="value", **_mean_look(dataset))
+    return [level] if math.isfinite(value) else []
 
 
 def _growth(dataset: xr.Dataset) -> Panel:
@@ -116,9 +108,9 @@ def _growth(dataset: xr.Dataset) -> Panel:
         marks.append(Line(periods[begin:], line, **look))
     elif math.isfinite(float(a["largest_exponent"])):
         marks.append(Line(NONE, NONE, **look))
-    across = Axis("periods since the start", _elapsed(dataset))
     up = Axis("ln |δx|", holding(growth, 0.0))
-    return Panel("growth", "growth along the start's own trajectory", across, up, marks)
+    title = "growth along the start's own trajectory"
+    return Panel("growth", title, _clock(dataset, ""), up, marks)
 
 
 def _average(dataset: xr.Dataset) -> Panel:
@@ -129,13 +121,13 @@ def _average(dataset: xr.Dataset) -> Panel:
     shown = [mean]
     if math.isfinite(a["largest_exponent_stderr"]):
         low, high = mean - _SIGMAS * error, mean + _SIGMAS * error
-        said = f"±{_SIGMAS} standard errors of the mean"
-        marks.append(Band(periods, low, high, colour=_BAND, name=said, path="band"))
+        text = f"±{_SIGMAS} standard errors of the mean"
+        marks.append(Band(periods, low, high, colour=_BAND, name=text, path="band"))
         shown += [low, high]
     if a["end"] == "undamped":
         regular = np.log1p(periods / a["dropped_periods"]) / (periods * a["forcing_period"])
-        said = "regular motion: deviations grow as τ"
-        marks.append(Line(periods, regular, width=1.0, dash=":", name=said, colour=INK, order=4.0))
+        text = "regular motion: deviations grow as τ"
+        marks.append(Line(periods, regular, width=1.0, dash=":", name=text, order=4.0))
         shown.append(regular)
     marks += [*_level(dataset), Line(periods, mean, colour=_LINE, path="own", order=3.0)]
     across = Axis("periods averaged, each", (periods[0], periods[-1]), "log")
@@ -156,10 +148,10 @@ def _sliding(dataset: xr.Dataset) -> Panel:
     rates = gained / (max(width, 1) * float(a["forcing_period"]))
     marks = [*_transient(dataset), *_level(dataset)]
     marks.append(Line(elapsed[whole].astype(float), rates, colour=_LINE, path="own", order=3.0))
-    across = Axis("periods since the start, last of each", _elapsed(dataset))
     up = Axis(_rate(dataset), holding(rates, 0.0, float(a["largest_exponent"]), margin=0.08))
     title = f"exponent over {a['window']} periods"
-    return Panel("average", title, across, up, marks, root="exponent")
+    clock = _clock(dataset, ", last of each")
+    return Panel("average", title, clock, up, marks, root="exponent")
 
 
 def _distribution(dataset: xr.Dataset) -> Panel:
@@ -179,11 +171,10 @@ def _distribution(dataset: xr.Dataset) -> Panel:
 
 
 def _attractor(dataset: xr.Dataset) -> Panel:
-    theta = plane.angles(dataset, dataset["point_theta"].values)
-    points = plane.points(dataset)
+    theta, points = plane.angles(dataset, dataset["point_theta"].values), plane.points(dataset)
     at = plane.copies(dataset, points, *theta)
     size = 2.0 if attractors_of(dataset)[0].chaotic else 7.0
     colour = palette.on_white(colours_of(dataset)[0])
     spots = Points(*at.T, colour=colour, size=size, path="points")
-    across, up = names.phase_plane(theta, plane.padded(points[:, 1]), Units.of(facts(dataset)))
-    return Panel("attractor", "attractor, once a period", across, up, [spots])
+    sides = names.phase_plane(theta, plane.padded(points[:, 1]), Units.of(facts(dataset)))
+    return Panel("attractor", "attractor, once a period", *sides, [spots])

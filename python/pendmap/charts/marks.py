@@ -191,3 +191,9 @@ def bars(x: npt.ArrayLike, low: npt.ArrayLike, high: npt.ArrayLike) -> tuple[Flo
     at, bottom, top = np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in (x, low, high)))
     gap = np.full(at.shape, np.nan)
     return np.repeat(at, 3), np.stack([bottom, top, gap], axis=1).ravel()
+
+
+def this_pendulum(x: float, y: float, *, named: bool = True, clip: bool = True) -> Points:
+    """Return the star at the parameters of the pendulum itself."""
+    look: dict[str, Any] = {"marker": "*", "size": 9.0, "order": 4.0, "path": "own", "clip": clip}
+    return Points(np.array([x]), np.array([y]), name="this pendulum" if named else "", **look)

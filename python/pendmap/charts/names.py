@@ -73,16 +73,12 @@ def proportion(theta: Ends, velocity: Ends, units: Units) -> float:
 
 def symbol(name: str, unit: str = "1") -> str:
     """Return the symbol of a parameter with its unit, separated by a blank."""
-    own = LABELS[name].symbol if name in LABELS else name
-    return own if unit in ("", "1") else f"{own} ({unit})"
+    mine = LABELS[name].symbol if name in LABELS else name
+    return mine if unit in ("", "1") else f"{mine} ({unit})"
 
 
 def parameters(attrs: Mapping[Any, Any], without: Collection[str] = ()) -> str:
-    """Return the model's parameters in one line, in its units, then its effects.
-
-    Phase, torque and friction are omitted if they are 0, frequency and phase if there is no drive
-    (p = 0), and parameters in ``without``, which vary.
-    """
+    """Return the model's parameters in one line, in its units, then its effects."""
     without = {_LABORATORY.get(name, name) for name in without}
     driven = float(attrs.get("p", 1.0)) != 0.0 or "p" in without
     units = Units.of(attrs)
@@ -94,7 +90,7 @@ def parameters(attrs: Mapping[Any, Any], without: Collection[str] = ()) -> str:
         if key in attrs and key not in never and (key in _ALWAYS or float(attrs[key]) != 0.0)
     ]
     acting = [effect.title(units, without).replace("_", " ") for effect in effects_of(attrs)]
-    listed = (",  ".join(part.rstrip() for part in each) for each in (parts, acting) if each)
+    listed = (",  ".join(part.rstrip() for part in one) for one in (parts, acting) if one)
     return typographic(";   ".join(listed))
 
 
@@ -123,7 +119,7 @@ def angle(ends: Ends, name: str = ANGLE) -> Axis:
 
 def sizes(name: str, *values: npt.ArrayLike) -> Axis:
     """Return an axis of positive values from 0, or a logarithmic one if they differ much."""
-    every = np.concatenate([np.ravel(np.asarray(each, dtype=float)) for each in values])
+    every = np.concatenate([np.ravel(np.asarray(one, dtype=float)) for one in values])
     every = every[np.isfinite(every)]
     low, high = float(every.min()), float(every.max())
     if high > _WIDE * low > 0:
@@ -132,21 +128,17 @@ def sizes(name: str, *values: npt.ArrayLike) -> Axis:
 
 
 def signed(curves: Sequence[Floats], name: str, *, least: float = 1e-12) -> tuple[Axis, list[Mark]]:
-    """Return an axis that is logarithmic on both sides of 0, and lines at its changes of scale.
-
-    The linear part contains nearly all of the curve nearest to 0 and is at least ``least``, so that
-    noise is not enlarged. An axis with little beyond it is linear.
-    """
-    known = [each[np.isfinite(each)] for each in curves]
-    known = [each for each in known if np.any(each != 0)]
+    """Return an axis that is logarithmic on both sides of 0, and lines at its changes of scale."""
+    known = [one[np.isfinite(one)] for one in curves]
+    known = [one for one in known if np.any(one != 0)]
     if not known:
         return Axis(name, (-1.0, 1.0)), []
-    inner = min(float(np.percentile(np.abs(each), _MOSTLY)) for each in known)
+    inner = min(float(np.percentile(np.abs(one), _MOSTLY)) for one in known)
     inner = 10.0 ** math.ceil(math.log10(max(inner, least)) - 0.3)
-    low, high = min(float(each.min()) for each in known), max(float(each.max()) for each in known)
+    low, high = min(float(one.min()) for one in known), max(float(one.max()) for one in known)
     if max(-low, high) <= _NEAR * inner:
         return Axis(name, holding([low, high, 0.0])), [ZERO]
     ends = (min(1.5 * low, -1.2 * inner), max(1.5 * high, 1.2 * inner))
     bends = [Level(end, colour=QUIET, width=0.6, dash=DOTTED, order=0.0) for end in (-inner, inner)]
-    said = f"{name}\nlog beyond ±{plane.power(inner)}"
-    return Axis(said, ends, "signed", straight=inner), [ZERO, *bends]
+    text = f"{name}\nlog beyond ±{plane.power(inner)}"
+    return Axis(text, ends, "signed", straight=inner), [ZERO, *bends]

@@ -27,7 +27,7 @@ MOST: Final = 16  # Greatest number of named orbits; a legend gives the number o
 def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> Chart:
     """Return the orbits: full lines and points if stable, broken lines and open points if not."""
     del cells
-    units = Units.of(facts(dataset))
+    units, count = Units.of(facts(dataset)), dataset.sizes["orbit"]
     points = plane.points(dataset)
     paths = [_path(dataset, dataset["path_orbit"].values == i) for i in dataset["id"].values]
     every = np.concatenate([points, *paths])
@@ -35,37 +35,34 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     theta = plane.angles(dataset, every[:, 0])
     box = (float(dataset.attrs["low_velocity"]), float(dataset.attrs["high_velocity"]))
     velocity = plane.padded(every[:, 1]) if every.size else box
-    marks = _drawn(dataset, theta)
-    count = int(dataset.attrs.get("draws", 0))
-    over = f";   grey dots: {counted(count, 'draw')}" if count else ""
+    marks: list[Mark] = []
+    draws, over = int(dataset.attrs.get("draws", 0)), ""
+    if draws:
+        at = np.stack([dataset[f"drawn_{n}"].values.ravel() for n in ("theta", "velocity")], axis=1)
+        at = plane.copies(dataset, at[np.isfinite(at[:, 0])], *theta)
+        marks.append(Points(*at.T, marker=".", size=3.0, colour=QUIET, order=3.0))
+        over = f";   grey dots: {counted(draws, 'draw')}"
     # Stable orbits are drawn last, on top.
     stable = dataset["stable"].values.astype(bool)
     colours = colours_of(dataset)
-    for k in [*np.flatnonzero(~stable), *np.flatnonzero(stable)]:
-        own = points[dataset["point_orbit"].values == dataset["id"].values[k]]
-        at = plane.copies(dataset, own, *theta)
-        marks += _orbit(dataset, int(k), paths[k], at, colours[k])
-    if dataset.sizes["orbit"] > MOST:
-        more = f"and {dataset.sizes['orbit'] - MOST} more"
-        marks.append(Points(NONE, NONE, marker="none", name=more))
-    across, up = names.phase_plane(theta, velocity, units)
+    for k in np.argsort(stable, kind="stable").tolist():
+        mine = points[dataset["point_orbit"].values == dataset["id"].values[k]]
+        at = plane.copies(dataset, mine, *theta)
+        marks += _orbit(dataset, k, paths[k], at, colours[k])
+    if count > MOST:
+        marks.append(Points(NONE, NONE, marker="none", name=f"and {count - MOST} more"))
+    n, w = int(dataset.attrs["n"]), int(dataset.attrs["w"])
+    which = f"{n}:{typographic(f'{w:+d}') if w else 0}"
+    some = "The orbit" if count == 1 else f"All {count} orbits"
     low, high = (units.bare(end, VELOCITY) for end in velocity)
+    sides = names.phase_plane(theta, velocity, units)
     return Chart(
-        _title(dataset),
+        f"{some} {which}" if count else f"No orbit {which}",
         names.parameters(facts(dataset)) + over,
-        [[Panel("phase", "", across, up, marks)]],
+        [[Panel("phase", "", *sides, marks)]],
         ratio=min(max((high - low) / (theta[1] - theta[0]), 0.6), 1.1),
-        remark="" if dataset.sizes["orbit"] else "No orbit was found.",
+        remark="" if count else "No orbit was found.",
     ).only(layer)
-
-
-def _drawn(dataset: xr.Dataset, theta: tuple[float, float]) -> list[Mark]:
-    """Return the points of the orbits over draws of the parameters."""
-    if not int(dataset.attrs.get("draws", 0)):
-        return []
-    at = [dataset[f"drawn_{name}"].values.ravel() for name in ("theta", "velocity")]
-    points = plane.copies(dataset, np.stack(at, axis=1)[np.isfinite(at[0])], *theta)
-    return [Points(*points.T, marker=".", size=3.0, colour=QUIET, order=3.0)]
 
 
 def _orbit(dataset: xr.Dataset, k: int, path: Floats, at: Floats, colour: str) -> list[Mark]:
@@ -74,10 +71,10 @@ def _orbit(dataset: xr.Dataset, k: int, path: Floats, at: Floats, colour: str) -
     stable = bool(int(row["stable"]))
     moduli = np.hypot(*np.moveaxis(row["multipliers"].values, -1, 0))
     largest = float(np.nanmax(moduli)) if np.isfinite(moduli).any() else math.nan
-    says = "stable" if stable else "unstable"
-    said = f"{number}: {typeset(name)}, {says}, largest |multiplier| {largest:.4g}"
+    which = "stable" if stable else "unstable"
+    text = f"{number}: {typeset(name)}, {which}, largest |multiplier| {largest:.4g}"
     named = number in sorted(dataset["id"].values)[:MOST]
-    look: dict[str, Any] = {"colour": colour, "name": said if named else ""}
+    look: dict[str, Any] = {"colour": colour, "name": text if named else ""}
     # Pale colours on white, and all colours in grey, need an edge.
     line: dict[str, Any] = {"halo": QUIET, "path": f"{number}/path"}
     line |= {"width": 1.6} if stable else {"width": 1.0, "dash": DASHED}
@@ -91,17 +88,8 @@ def _path(dataset: xr.Dataset, mine: npt.NDArray[np.bool_]) -> Floats:
     piece = dataset["path_piece"].values
     lines = []
     for k in np.unique(piece[mine]):
-        own = mine & (piece == k)
-        motion = dataset["path_theta"].values[own], dataset["path_velocity"].values[own]
+        values = mine & (piece == k)
+        motion = dataset["path_theta"].values[values], dataset["path_velocity"].values[values]
         whole = np.stack(motion, axis=1)
         lines.append(whole if plane.on_line(dataset) else plane.broken_at_wrap(*motion))
     return np.stack(together(lines), axis=1)
-
-
-def _title(dataset: xr.Dataset) -> str:
-    n, w = int(dataset.attrs["n"]), int(dataset.attrs["w"])
-    count = dataset.sizes["orbit"]
-    signed = "0" if w == 0 else typographic(f"{w:+d}")
-    if count == 0:
-        return f"No orbit {n}:{signed}"
-    return f"{'The orbit' if count == 1 else f'All {count} orbits'} {n}:{signed}"

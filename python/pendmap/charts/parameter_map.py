@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import operator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -13,11 +13,9 @@ from pendmap._core import Attractor
 from pendmap.analysis.cell_search import UNDECIDED
 from pendmap.analysis.orbit_table import attractors_of
 from pendmap.analysis.parameter_map import sets
-from pendmap.charts import names, palette, plane, tongues
-from pendmap.charts.chart import Axis, Chart, Panel
+from pendmap.charts import names, palette, parameters, plane, tongues
 from pendmap.charts.legend import colours_of
 from pendmap.charts.marks import Colours, Image, Line, Mark, together
-from pendmap.errors import InputError
 from pendmap.files import facts
 from pendmap.formatting import typographic
 from pendmap.units import Units
@@ -26,6 +24,8 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     import xarray as xr
 
+    from pendmap.charts.chart import Chart
+    from pendmap.charts.marks import Ends, Floats
 
 LAYERS = {
     "kinds": "kinds of attractor",
@@ -42,7 +42,6 @@ _RECORDED: Final = ("exponent", "attractors", "undecided")
 """Layers of a recording in addition to the leading ones."""
 _STRIPES: Final = 100  # Stripes across an image
 _LEAST_HALF: Final = 0.05  # Least ratio of the halves of the colour scale of exponents
-_MOST_COUNT: Final = 8  # Largest count that has its own colour
 _MOST, _LEAST = 13, 0.002
 """Greatest number of named kinds, and the least share of the cells with one."""
 
@@ -107,14 +106,10 @@ def kinds(dataset: xr.Dataset) -> list[Kind]:
 
 
 def striped(dataset: xr.Dataset, size: int, width: int) -> npt.NDArray[np.uint8]:
-    """Return an image of indices into :func:`kinds`, row 0 lowest, one block of pixels per cell.
-
-    Cells with several kinds have diagonal stripes in turn. ``size`` is about the number of pixels
-    of the longer side, ``width`` that of a stripe along a row.
-    """
+    """Return an image of indices into :func:`kinds`, row 0 lowest, one block of pixels per cell."""
     listed = kinds(dataset)
-    own = {member: k for k, kind in enumerate(listed) for member in kind.members}
-    groups = [sorted({own[name] for name in one}) for one in sets(dataset)]
+    mine = {member: k for k, kind in enumerate(listed) for member in kind.members}
+    groups = [sorted({mine[name] for name in one}) for one in sets(dataset)]
     regime = plane.pixels(dataset, dataset["regime"], size)
     rows, columns = regime.shape
     factor = [max(1, round(size / count)) for count in (rows, columns)]
@@ -133,41 +128,27 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
     """Return the kinds of attractor, striped if several coexist, and other layers."""
     shares = [f"share {kind}" for kind in dataset["kind"].values]
     known = [one for one in LAYERS if one != "certainty" or one in dataset]
-    if layer is not None and layer not in (*known, *shares):
-        layers = ", ".join([*known, *shares])
-        raise InputError(f"layer must be one of this map: {layers}, got {layer!r}")
+    parameters.check_layer(layer, [*known, *shares], "this map: ")
     leading = ("kinds", "certainty" if "certainty" in dataset else "exponent")
     others = [one for one in _RECORDED if one in known and one not in leading]
-    shown = [layer] if layer else [*leading, *others]
-    varied = [str(dataset.attrs[which]) for which in ("columns", "rows")]
-    symbols = [names.symbol(one, str(dataset[one].attrs.get("units", "1"))) for one in varied]
-    across, up = (plane.outer_edges(dataset, one) for one in varied)
-    sides = Axis(symbols[0], across), Axis(symbols[1], up)
+    varied = str(dataset.attrs["columns"]), str(dataset.attrs["rows"])
     lines = _curves(dataset)
-    panels = []
-    for one in shown:
-        title = LAYERS.get(one, one) + (
-            " and shares; stripes: coexisting" if one == "kinds" else ""
-        )
-        image = _image(dataset, one, across, up, cells)
-        panels.append(Panel(one, title, *sides, [image, *lines]))
+
+    def make(name: str, across: Ends, up: Ends) -> tuple[str, list[Mark]]:
+        title = LAYERS.get(name, name)
+        if name == "kinds":
+            title += " and shares; stripes: coexisting"
+        return title, [_image(dataset, name, across, up, cells), *lines]
+
     fixed = names.parameters(facts(dataset), varied)
-    shape: tuple[Any, ...] = dataset["regime"].shape
-    starts = int(dataset.attrs["starts"])
-    size = f"{shape[1]} × {shape[0]} cells, {starts} starts each"
-    return Chart(
-        f"Attractors over {' and '.join(name.split(' (')[0] for name in symbols)}",
-        f"{fixed};   {size}",
-        [panels[: len(leading)]],
-        recorded=panels,
-        ratio=0.85,
-        tabs=True,
-    )
+    rows, columns = dataset["regime"].shape
+    size = f"{columns} × {rows} cells, {int(dataset.attrs['starts'])} starts each"
+    titles = f"Attractors over {parameters.over(varied)}", f"{fixed};   {size}"
+    shown = [layer] if layer else [*leading, *others]
+    return parameters.layers(dataset, varied, titles, make, shown, leading)
 
 
-def _image(
-    dataset: xr.Dataset, name: str, across: tuple[float, float], up: tuple[float, float], cells: int
-) -> Image:
+def _image(dataset: xr.Dataset, name: str, across: Ends, up: Ends, cells: int) -> Image:
     """Return the image of a layer."""
     if name == "kinds":
         classes = [(kind.text, kind.colour) for kind in kinds(dataset)]
@@ -182,42 +163,33 @@ def _image(
     return Image(values, across, up, colours=look, path="values")
 
 
-def _colours(dataset: xr.Dataset, name: str, values: npt.NDArray[np.float64]) -> Colours:
+def _colours(dataset: xr.Dataset, name: str, values: Floats) -> Colours:
     """Return the colour scale: centred at 0 for exponents, steps for counts, 0 to 1 for shares."""
-    said = _said(dataset, name)
+    if name.startswith("share "):
+        kind = name.removeprefix("share ")
+        return Colours(f"share of the starts on {kind}", "cividis", 0.0, 1.0)
+    text = LAYERS[name]
     if name == "exponent":
+        none = "" if np.isfinite(dataset["exponent"].values).all() else "; grey: none"
+        unit = "1/s" if Units.of(facts(dataset)).si else "1 per τ"
         low, high = (float(q) for q in np.quantile(values, [0.01, 0.99])) if values.size else (0, 0)
         low, high = min(low, -1e-3, -_LEAST_HALF * high), max(high, 1e-3, -_LEAST_HALF * low)
         # The halves have different scales: without ticks on both, dark blue would appear as far
         # from 0 as dark red.
         ticks = sorted({at for side in ((low, 0.0), (0.0, high)) for at in _few(*side)})
-        return Colours(said, "RdBu_r", low, high, "centred", "both", ticks)
-    if name in ("attractors", "period", "winding"):
-        top = int(min(values.max(initial=1), _MOST_COUNT))
-        low = -0.5 if name != "period" else 0.5
-        beyond: Literal["max", "neither"] = "max" if values.max(initial=0) > top else "neither"
-        whole = [float(k) for k in range(int(low + 0.5), top + 1)]
-        return Colours(said, "viridis", low, top + 0.5, "counts", beyond, whole)
-    return Colours(said, "cividis", 0.0, 1.0)
+        text = f"{text} ({unit}{none})"
+        return Colours(text, "RdBu_r", low, high, "centred", "both", ticks)
+    if name == "period":
+        return parameters.counts(f"{text} (drive's; grey: none)", values, 1)
+    if name in ("attractors", "winding"):
+        return parameters.counts(text, values)
+    return Colours(text, "cividis", 0.0, 1.0)
 
 
 def _few(low: float, high: float) -> list[float]:
     """Return at most four round ticks in a half of a colour bar."""
     ticks = [at for at, _ in plane.plain_ticks(low, high)]
     return ticks[::2] if low == 0.0 or len(ticks) % 2 else ticks[1::2]
-
-
-def _said(dataset: xr.Dataset, name: str) -> str:
-    """Return the quantity of a layer in words, with its unit."""
-    if name.startswith("share "):
-        return f"share of the starts on {name.removeprefix('share ')}"
-    unit = ""
-    if name == "exponent":
-        none = "" if np.isfinite(dataset["exponent"].values).all() else "; grey: none"
-        unit = f" ({'1/s' if Units.of(facts(dataset)).si else '1 per τ'}{none})"
-    if name == "period":
-        unit = " (drive's; grey: none)"
-    return LAYERS[name] + unit
 
 
 def _curves(dataset: xr.Dataset) -> list[Mark]:
@@ -229,17 +201,16 @@ def _curves(dataset: xr.Dataset) -> list[Mark]:
     turned = str(dataset.attrs["rows"]).lower() == "omega"
     sought = dataset["curve_fold_sought"].values > 0
     fold = np.stack([omega, dataset["curve_fold"].values], axis=1)[sought]
-    found: list[Mark] = []
-    for k, (name, dash, lines) in enumerate(
-        (
-            ("rest: multiplier +1", "-", tongues.joined(omega, rows, 1)),
-            (typographic("rest: multiplier -1"), "--", tongues.joined(omega, rows, -1)),
-            ("fold of the oscillation born there", ":", [fold]),
-        )
-    ):
+    curves = (
+        ("rest: multiplier +1", "-", tongues.joined(omega, rows, 1)),
+        (typographic("rest: multiplier -1"), "--", tongues.joined(omega, rows, -1)),
+        ("fold of the oscillation born there", ":", [fold]),
+    )
+    marks: list[Mark] = []
+    for k, (name, dash, lines) in enumerate(curves):
         x, y = together(line[:, ::-1] if turned else line for line in lines)
         if np.isfinite(x + y).sum() > 1:
             look: dict[str, Any] = {"name": name, "dash": dash, "path": f"curves/{k}"}
             look["colour"] = palette.CURVES[k]
-            found.append(Line(x, y, width=1.1, halo="#ffffff", order=2.0, **look))
-    return found
+            marks.append(Line(x, y, width=1.1, halo="#ffffff", order=2.0, **look))
+    return marks

@@ -62,12 +62,7 @@ def outer_edges(dataset: xr.Dataset, name: str) -> tuple[float, float]:
 
 
 def pixels(dataset: xr.Dataset, array: xr.DataArray, limit: int) -> npt.NDArray[Any]:
-    """Return an array over two rising axes as an image of at most ``limit`` pixels along each.
-
-    Each pixel has the value of the cell at its centre. One pixel is one cell if cells are equally
-    wide, else the narrowest has eight. Cells are selected before conversion, so that a large map is
-    never copied whole.
-    """
+    """Return an array over two rising axes as an image of at most ``limit`` pixels along each."""
     shown = {str(d): cells(edges(dataset, str(d)), limit) for d in array.dims}
     return np.asarray(array.isel(shown).values)
 
@@ -104,11 +99,7 @@ def points(dataset: xr.Dataset) -> Floats:
 
 
 def copies(dataset: xr.Dataset, points: Floats, low: float, high: float) -> Floats:
-    """Return the points, shape (m, 2), in [low, high], with their copies shifted by 2 pi k.
-
-    Unwrapped angles have no copies. An empty array is returned if there would be more than a
-    hundred copies of each.
-    """
+    """Return the points, shape (m, 2), in [low, high], with their copies shifted by 2 pi k."""
     if on_line(dataset):
         return points[(points[:, 0] >= low) & (points[:, 0] <= high)]
     if high - low > MOST_COPIES * TWO_PI:
@@ -182,10 +173,7 @@ def shifted(name: str, shift: float) -> str:
 
 
 def broken_at_wrap(theta: npt.ArrayLike, velocity: npt.ArrayLike) -> Floats:
-    """Return a curve on the cylinder, shape (n + 3 m, 2), its angle wrapped to (-pi, pi].
-
-    Each of the m crossings adds a point on one edge, a row of nan, and a point on the other edge.
-    """
+    """Return a curve on the cylinder, shape (n + 3 m, 2), its angle wrapped to (-pi, pi]."""
     angle, rate = np.asarray(theta, dtype=float), np.asarray(velocity, dtype=float)
     within = wrapped(angle)
     turn = np.round((angle - within) / TWO_PI)
@@ -201,19 +189,15 @@ def broken_at_wrap(theta: npt.ArrayLike, velocity: npt.ArrayLike) -> Floats:
 
 
 def envelope(time: Floats, values: Floats, bins: int) -> tuple[Floats, Floats]:
-    """Return the lowest and the highest sample of a curve in each of ``bins`` bins.
-
-    The samples are in order of time, with the first and the last one. A curve of at most two
-    samples per bin is returned unchanged.
-    """
+    """Return the lowest and the highest sample of a curve in each of ``bins`` bins."""
     count = values.size
     if count <= 2 * bins:
         return time, values
     edges = np.linspace(0, count, bins + 1).astype(np.int64)
     # Bins differ by at most one sample: padded to the longest, each bin is a row.
     rows = np.minimum(edges[:-1, None] + np.arange(np.diff(edges).max()), edges[1:, None] - 1)
-    of_rows, each = values[rows], np.arange(bins)
-    lowest, highest = (rows[each, end(axis=1)] for end in (of_rows.argmin, of_rows.argmax))
+    of_rows, one = values[rows], np.arange(bins)
+    lowest, highest = (rows[one, end(axis=1)] for end in (of_rows.argmin, of_rows.argmax))
     at = np.unique(np.concatenate([[0, count - 1], lowest, highest]))
     return time[at], values[at]
 
@@ -232,10 +216,7 @@ def padded(values: Floats) -> tuple[float, float]:
 
 
 def _offset(low: float, high: float) -> float:
-    """Return a round number near a window that is narrow relative to its distance from 0, else 0.
-
-    Ticks of such a window are short as differences from it, and too long otherwise.
-    """
+    """Return a round number near a window far from 0 relative to its width, else 0."""
     width = high - low
     if not 0.0 < width < NARROW * max(abs(low), abs(high)):
         return 0.0

@@ -7,7 +7,6 @@ import textwrap
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
 from pendmap.charts import names
 from pendmap.charts.chart import Axis, Chart, Panel, holding
@@ -44,51 +43,45 @@ def sheet(records: Experiment | Run, *, width: float = WIDTH) -> Chart:
 
 
 def _one(run: Run, width: float) -> Chart:
-    noted = _listed(run, max(int((width - 1.0) / 0.073), 20))
-    last = _decay(run) if run.peaks_only else _residuals(run)
-    return Chart(
-        f"Record {run.name}",
-        _subtitle(run),
-        [[_flags(run, width)], [_history(run)], [_intervals(run), last]],
-        heights=(0.15, 1.25, 1.0),
-        size=(width, 6.3 + 0.19 * len(noted)),
-        notes=noted,
-    )
-
-
-def _subtitle(run: Run) -> str:
-    if run.peaks_only:
-        return f"{run.time.size} turning points, {moment(run.time[0])} to {moment(run.time[-1])} s"
-    said = noise_said(noise_floor(run), noise_unit(run)).split(",", maxsplit=1)[0]
-    used = f"{run.trusted.sum()} of {run.time.size} samples for fitting"
-    return f"{run.kind}, {run.rate_hz:.5g} Hz, {used};   noise {typographic(said)}"
-
-
-def _listed(run: Run, letters: int) -> list[str]:
-    """Return the findings as lines, numbered as in the figure."""
+    letters = max(int((width - 1.0) / 0.073), 20)
     lines: list[str] = []
-    for number, found in enumerate(run.findings, 1):
-        mended = "mended: " if found.mended else ""
-        lines += textwrap.wrap(
-            f"{number}  {mended}{found.text}", letters, subsequent_indent="    ", max_lines=2
-        )
+    for number, finding in enumerate(run.findings, 1):
+        text = f"{number}  {'mended: ' if finding.mended else ''}{finding.text}"
+        lines += textwrap.wrap(text, letters, subsequent_indent="    ", max_lines=2)
     if len(lines) > MOST_LINES:
         lines = [*lines[: MOST_LINES - 1], "...  pendmap look has the rest"]
-    return lines
+    if run.peaks_only:
+        ends = f"{moment(run.time[0])} to {moment(run.time[-1])} s"
+        subtitle, last = f"{run.time.size} turning points, {ends}", _decay(run)
+    else:
+        noise = noise_said(noise_floor(run), noise_unit(run)).split(",", maxsplit=1)[0]
+        used = f"{run.trusted.sum()} of {run.time.size} samples for fitting"
+        subtitle = f"{run.kind}, {run.rate_hz:.5g} Hz, {used};   noise {typographic(noise)}"
+        last = _residuals(run)
+    return Chart(
+        f"Record {run.name}",
+        subtitle,
+        [[_flags(run, width)], [_history(run)], [_intervals(run), last]],
+        heights=(0.15, 1.25, 1.0),
+        size=(width, 6.3 + 0.19 * len(lines)),
+        notes=lines,
+    )
 
 
 def _samples(run: Run, time: Floats, width: float) -> list[Mark]:
     """Return marks of the samples: those for fitting, others, and isolated outliers."""
-    alone = _lone(~run.trusted)
+    alone = np.zeros(time.size, bool)
+    for low, high in zip(*true_runs(~run.trusted), strict=True):
+        alone[low:high] = high - low <= 3  # noqa: PLR2004
     steps = np.diff(run.time)
     # A line from the previous sample would cross a gap.
     breaks = np.flatnonzero(np.concatenate([[False], steps > 5 * np.median(steps)]))
     marks: list[Mark] = []
-    for which, colour, said in (
+    for which, colour, text in (
         (~run.trusted & ~alone, UNUSED, "not for fitting"),
         (run.trusted, USED, "for fitting"),
     ):
-        look: dict[str, Any] = {"colour": colour, "name": said if which.any() else ""}
+        look: dict[str, Any] = {"colour": colour, "name": text if which.any() else ""}
         if not run.peaks_only:
             shown = np.where(which, run.theta, np.nan)
             line = np.insert(time, breaks, time[breaks]), np.insert(shown, breaks, np.nan)
@@ -99,14 +92,6 @@ def _samples(run: Run, time: Floats, width: float) -> list[Mark]:
         cross: dict[str, Any] = {"colour": FALSE, "marker": "x", "size": 4.5, "edge_width": 1.0}
         marks.append(Points(time[alone], run.theta[alone], name="outliers", **cross))
     return marks
-
-
-def _lone(marked: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """Return which of the marked samples lie in stretches of at most three: outliers."""
-    few = np.zeros(marked.size, bool)
-    for low, high in zip(*true_runs(marked), strict=True):
-        few[low:high] = high - low <= 3  # noqa: PLR2004
-    return few
 
 
 def _history(run: Run) -> Panel:
@@ -125,10 +110,10 @@ def _flags(run: Run, width: float) -> Panel:
     inches = (width - 1.0) / (end - begin)
     taken: list[list[float]] = [[], []]
     marks: list[Mark] = []
-    for number, found in enumerate(run.findings, 1):
-        if found.from_s is None or found.to_s is None:
+    for number, finding in enumerate(run.findings, 1):
+        if finding.from_s is None or finding.to_s is None:
             continue
-        left, right = max(found.from_s, low), min(found.to_s, high)
+        left, right = max(finding.from_s, low), min(finding.to_s, high)
         if right < low or left > high:
             continue
         at = (left - begin) * inches
@@ -136,9 +121,9 @@ def _flags(run: Run, width: float) -> Panel:
         if row is None:
             continue
         taken[row].append(at)
-        colour = QUIET if found.mended else ALARM
+        colour = QUIET if finding.mended else ALARM
         ends, height = np.array([left, right]), np.full(2, row + 0.12)
-        if right - left > SHORT * (high - low) and not found.where.startswith("row"):
+        if right - left > SHORT * (high - low) and not finding.where.startswith("row"):
             marks.append(Line(ends, height, colour=colour, width=1.6))
         else:
             marks.append(Points(ends[:1], height[:1], colour=colour, marker="v", size=3.5))
@@ -210,11 +195,19 @@ def _many(experiment: Experiment, width: float) -> Chart:
     known = ", ".join(f"{name} = {value:g}" for name, value in experiment.known.items())
     panels = []
     for k, run in enumerate(runs):
+        words = (
+            [run.kind]
+            if run.drive is None
+            else [run.kind, f"p = {run.drive['p']:g}, Ω = {run.drive['Omega']:g} rad/s"]
+        )
+        words += ["held out"] if run.hold_out else []
+        findings = listed([finding.what for finding in run.findings], 3)
+        title = f"{run.name}: " + ", ".join([*words, findings] if findings else words)
         name = "t from the start (s)" if k + 1 == len(runs) else ""
         clock = Axis(name, (-0.01 * longest, 1.01 * longest))
         marks = _samples(run, run.time - run.time[0], 0.7)
         up = names.angle(holding(run.theta, margin=0.08))
-        panels.append(Panel(str(k), _said(run), clock, up, marks))
+        panels.append(Panel(str(k), title, clock, up, marks))
     return Chart(
         f"Experiment {experiment.path.resolve().name}",
         f"{len(experiment.runs)} runs{shown};   {known}".rstrip("; "),
@@ -222,13 +215,3 @@ def _many(experiment: Experiment, width: float) -> Chart:
         size=(width, 1.4 + 1.25 * len(runs)),
         letters=False,
     )
-
-
-def _said(run: Run) -> str:
-    said: list[str] = [run.kind]
-    if run.drive is not None:
-        said.append(f"p = {run.drive['p']:g}, Ω = {run.drive['Omega']:g} rad/s")
-    if run.hold_out:
-        said.append("held out")
-    said.append(listed([found.what for found in run.findings], 3))
-    return f"{run.name}: " + ", ".join(filter(None, said))

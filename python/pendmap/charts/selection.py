@@ -65,12 +65,7 @@ _BLOCK = 1_000_000  # Cells that are counted at a time, so that a large map is n
 
 
 def shown(dataset: xr.Dataset) -> xr.Dataset:
-    """Return a result, or a selection of one, ready to be drawn; raise InputError otherwise.
-
-    Axes rise and dimensions have a fixed order. For a selection, shares, tables and summary are
-    recomputed, or marked as those of the whole. A whole result is unchanged. One map of a sweep is
-    a basin map.
-    """
+    """Return a result, or a selection of one, ready to be drawn; raise InputError otherwise."""
     dataset = member(dataset)
     kind = str(dataset.attrs["kind"])
     if kind == "basins" and "theta" not in dataset.coords:
@@ -112,12 +107,12 @@ def member(dataset: xr.Dataset) -> xr.Dataset:
     kinds = np.array(str(part["kind"].attrs["flag_meanings"]).split())
     part = part.drop_vars("plane").assign(kind=("attractor", kinds[part["kind"].values]))
     at = ", ".join(span(name, *[float(dataset[name])] * 2) for name in varied)
-    told = f"One map of a sweep, {at}. The text below describes the whole sweep."
+    text = f"One map of a sweep, {at}. The text below describes the whole sweep."
     part.attrs = dataset.attrs | {
         "kind": "basins",
         "layers": "labels",
         "plane": shows,
-        "summary": f"{told}\n{dataset.attrs['summary']}",
+        "summary": f"{text}\n{dataset.attrs['summary']}",
     }
     # Not every map of a sweep is checked.
     reliable = not float(part["unreliable"]) > RELIABLE
@@ -220,23 +215,21 @@ def _bifurcation(dataset: xr.Dataset) -> xr.Dataset:
     """Keep the attractors and points at the selected values."""
     name = str(dataset.attrs["varied"])
     values = dataset[name].values
-    if "entry_value" not in dataset:  # from an earlier version, and whole
-        return dataset.assign(entry_value=("entry", values[dataset["entry_cell"].values]))
     _refuse_kinds(dataset)
     owner = _places(dataset, "entry", dataset["point_entry"].values)
     sweeps = {key: _places(dataset, "entry", dataset[key].values) for key in ("up", "down")}
-    kept = np.isin(dataset["entry_value"].values, values)
+    chosen = np.isin(dataset["entry_value"].values, values)
     loose = np.isin(dataset.get("loose_value", values[:0]), values)
     # The last entry is for -1, no attractor.
-    new = np.append(np.where(kept, np.cumsum(kept) - 1, -1), -1)
-    rows = {"entry": kept, "point": kept[owner], "loose": loose}
+    new = np.append(np.where(chosen, np.cumsum(chosen) - 1, -1), -1)
+    rows = {"entry": chosen, "point": chosen[owner], "loose": loose}
     part = dataset.isel(rows, missing_dims="ignore")
     part = part.assign(
-        point_entry=("point", new[owner[kept[owner]]]),
+        point_entry=("point", new[owner[chosen[owner]]]),
         up=(name, new[sweeps["up"]]),
         down=(name, new[sweeps["down"]]),
     )
-    if kept.all() and loose.all():
+    if chosen.all() and loose.all():
         return part
     return _note_selection(part, f"{counted(values.size, 'value')}")
 
@@ -247,10 +240,10 @@ def _tongues(dataset: xr.Dataset) -> xr.Dataset:
     for prefix in ("", "undamped_", "inverted_"):
         table = prefix.removesuffix("_") or "critical"
         if f"{table}_omega" in dataset:
-            own = dataset[f"{table}_omega"].values
-            dataset = dataset.isel({table: np.isin(own, omega)})
-            own = dataset[f"{table}_omega"].values
-            dataset[f"{prefix}index"] = (table, np.searchsorted(omega, own))
+            mine = dataset[f"{table}_omega"].values
+            dataset = dataset.isel({table: np.isin(mine, omega)})
+            mine = dataset[f"{table}_omega"].values
+            dataset[f"{prefix}index"] = (table, np.searchsorted(omega, mine))
     return dataset
 
 
@@ -263,10 +256,10 @@ def _trajectory(dataset: xr.Dataset) -> xr.Dataset:
 
 def _places(dataset: xr.Dataset, table: str, numbers: npt.NDArray[Any]) -> npt.NDArray[np.intp]:
     """Return the positions of numbers in a table; -1 for -1, which means none."""
-    own = dataset[table].values
-    place = np.searchsorted(own, numbers)
-    found = own[np.minimum(place, own.size - 1)] == numbers if own.size else numbers < 0
-    if not (found | (numbers < 0)).all():
+    mine = dataset[table].values
+    place = np.searchsorted(mine, numbers)
+    result = mine[np.minimum(place, mine.size - 1)] == numbers if mine.size else numbers < 0
+    if not (result | (numbers < 0)).all():
         raise InputError(f"{table}: a selection of it cannot be drawn; it must be one of an axis")
     return np.where(numbers < 0, -1, place)
 
@@ -278,9 +271,9 @@ def _note_selection(part: xr.Dataset, which: str) -> xr.Dataset:
         for name in reversed(_axes(part))
         for low, high in [plane.outer_edges(part, name)]
     ]
-    said = f"A part is shown: {', '.join(spans)}, {which}."
-    said += " The text below describes the whole result."
-    part.attrs = part.attrs | {"summary": f"{said}\n{part.attrs['summary']}"}
+    text = f"A part is shown: {', '.join(spans)}, {which}."
+    text += " The text below describes the whole result."
+    part.attrs = part.attrs | {"summary": f"{text}\n{part.attrs['summary']}"}
     return part
 
 

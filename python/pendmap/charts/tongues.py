@@ -12,7 +12,7 @@ from pendmap.analysis.critical_curves import PLANES, in_plane, window
 from pendmap.analysis.tongues import NEAR
 from pendmap.charts import names
 from pendmap.charts.chart import Axis, Chart, Panel
-from pendmap.charts.marks import QUIET, Areas, Line, Mark, Points, Text, together
+from pendmap.charts.marks import QUIET, Areas, Line, Mark, Points, Text, this_pendulum, together
 from pendmap.errors import InputError
 from pendmap.files import facts
 from pendmap.formatting import typographic
@@ -56,10 +56,7 @@ def chart(
     title: str = "Where rest is stable, hanging and inverted",
     marks: Sequence[tuple[float, float, str]] = (),
 ) -> Chart:
-    """Return the critical curves in both planes; a figure shows one of them.
-
-    ``marks`` are points ``(p, omega, name)`` drawn instead of the pendulum's own.
-    """
+    """Return the critical curves in both planes; a figure shows one of them."""
     del cells
     first = layer or str(dataset.attrs.get("plane", PLANES[0]))
     if first not in PLANES:
@@ -98,36 +95,35 @@ def _panel(dataset: xr.Dataset, plane: str, marks: Sequence[tuple[float, float, 
         # A hatch leaves the area below it visible, and has no seams.
         name = f"inverted {rest}"
         drawn.append(Areas(inverted, colour=_INVERTED, hatch="////", name=name))
-    found, above, undamped = (
+    result, above, undamped = (
         by_frequency(dataset, prefix, omega.size) for prefix in ("", "inverted_", "undamped_")
     )
-    for m, (name, said, colour, pale) in _CURVES.items():
+    for m, (name, text, colour, pale) in _CURVES.items():
         look: dict[str, Any] = {"width": 1.5 if m < 0 else 1.1, "order": 2.2}
-        lines = joined(omega, found, m)
-        drawn.append(curve(lines, colour=colour, name=said, path=name, **look))
+        lines = joined(omega, result, m)
+        drawn.append(curve(lines, colour=colour, name=text, path=name, **look))
         lines = joined(omega, above, m)
-        look["name"] = f"inverted rest: {said.partition(' (')[0]}" if lines else ""
+        look["name"] = f"inverted rest: {text.partition(' (')[0]}" if lines else ""
         drawn.append(curve(lines, colour=pale, path=f"inverted_{name}", **look))
     lines = [_tipped(line, m, omega) for m in _CURVES for line in joined(omega, undamped, m)]
-    said = "exact, without damping" if float(attrs["gamma"]) > 0 and lines else ""
-    drawn.append(curve(lines, colour=QUIET, width=0.6, name=said, path="undamped"))
+    text = "exact, without damping" if float(attrs["gamma"]) > 0 and lines else ""
+    drawn.append(curve(lines, colour=QUIET, width=0.6, name=text, path="undamped"))
     fold = np.stack([omega, dataset["fold"].values], axis=-1)[dataset["fold_sought"].values > 0]
-    said = "fold: the oscillation exists from here" if np.isfinite(to(fold)).any() else ""
+    text = "fold: the oscillation exists from here" if np.isfinite(to(fold)).any() else ""
     look = {"colour": _FOLD, "width": 1.6, "dash": (5.0, 2.0), "order": 2.1}
-    drawn.append(Line(*to(fold).T, name=said, path="fold", **look))
+    drawn.append(Line(*to(fold).T, name=text, path="fold", **look))
     drawn += _asymptotic(dataset, to)
     bands = [band for prefix in ("", "inverted_") for band in _bands(dataset, prefix)]
     if bands:
-        said = "95 % of the draws"
-        drawn.append(curve(bands, colour=QUIET, width=3.0, alpha=0.5, name=said))
+        text = "95 % of the draws"
+        drawn.append(curve(bands, colour=QUIET, width=3.0, alpha=0.5, name=text))
     edge = to(np.stack([omega, np.full_like(omega, p_max)], axis=-1))
     if (edge[:, 1] < 0.995 * top).any():
         drawn.append(Line(*edge.T, colour="#c8c8c8", width=3.0, name="largest p computed", order=1))
     if not marks:
-        own = to(np.array([[float(attrs["own_omega"]), float(attrs["own_p"])]]))
-        inside = x[0] <= own[0, 0] <= x[1] and 0 <= own[0, 1] <= top
-        star: dict[str, Any] = {"marker": "*", "size": 9.0, "order": 4.0, "path": "own"}
-        drawn.append(Points(*own.T, name="this pendulum" if inside else "", **star))
+        mine = to(np.array([[float(attrs["own_omega"]), float(attrs["own_p"])]]))
+        inside = x[0] <= mine[0, 0] <= x[1] and 0 <= mine[0, 1] <= top
+        drawn.append(this_pendulum(*map(float, mine[0]), named=bool(inside)))
     for p, at, name in marks:
         spot = to(np.array([[at, p]]))
         drawn.append(Points(*spot.T, size=5.0))
@@ -145,10 +141,10 @@ def _asymptotic(dataset: xr.Dataset, to: Callable[[Floats], Floats]) -> list[Mar
         whole = to(np.stack([omega, dataset["asymptotic"].values[k]], axis=-1))
         close = (error[k] < NEAR)[:, None]
         parting = np.where((error[k] < _PARTED)[:, None] & ~close, whole, np.nan)
-        said = "" if np.isnan(parting).all() else str(name)
+        text = "" if np.isnan(parting).all() else str(name)
         near = np.where(close, whole, np.nan)
         drawn += [
-            Line(*near.T, dash=look, width=1.0, name=said),
+            Line(*near.T, dash=look, width=1.0, name=text),
             Line(*parting.T, dash=look, width=0.5, alpha=0.45),
         ]
     return drawn
@@ -166,22 +162,18 @@ def _bands(dataset: xr.Dataset, prefix: str) -> list[Floats]:
 
 def by_frequency(dataset: xr.Dataset, prefix: str, count: int) -> list[list[tuple[float, int]]]:
     """Return amplitude and multiplier of the critical points of each frequency."""
-    found: list[list[tuple[float, int]]] = [[] for _ in range(count)]
+    result: list[list[tuple[float, int]]] = [[] for _ in range(count)]
     columns = (dataset[f"{prefix}{name}"].values for name in ("index", "p", "multiplier"))
     for index, p, multiplier in zip(*columns, strict=True):
-        found[int(index)].append((float(p), int(multiplier)))
-    return found
+        result[int(index)].append((float(p), int(multiplier)))
+    return result
 
 
-def joined(omega: Floats, found: list[list[tuple[float, int]]], multiplier: int) -> list[Floats]:
-    """Return the lines through the points with this multiplier.
-
-    Counted from below, the two boundaries of a tongue keep their order; if the count changes from
-    one frequency to the next, the nearest points are joined.
-    """
+def joined(omega: Floats, result: list[list[tuple[float, int]]], multiplier: int) -> list[Floats]:
+    """Return the lines through the points with this multiplier."""
     open_: list[list[Point]] = []
     done: list[list[Point]] = []
-    for w, row in zip(omega, found, strict=True):
+    for w, row in zip(omega, result, strict=True):
         values = [p for p, m in row if m == multiplier]
         pairs = sorted(
             (abs(_ahead(line, w) - p), i, j)
@@ -222,10 +214,7 @@ def _paired(ended: list[list[Point]]) -> list[list[Point]]:
 
 
 def _tipped(line: Floats, multiplier: int, omega: Floats) -> Floats:
-    """Add the tip of an undamped tongue, ``p = 0`` at ``omega = 2/k``, to a line around it.
-
-    At the tip the linear equation without drive has the multiplier ``(-1)^k``, for any model.
-    """
+    """Add the tip of an undamped tongue, ``p = 0`` at ``omega = 2/k``, to a line around it."""
     spacing = float(np.diff(omega).max())
     for k in range(1 if multiplier < 0 else 2, 9, 2):
         tip = 2 / k
@@ -251,11 +240,7 @@ def _ahead(line: list[Point], w: float) -> float:
 def _stable(
     omega: Floats, dataset: xr.Dataset, prefix: str, first: npt.NDArray[np.int8], p_max: float
 ) -> list[Floats]:
-    """Return quadrangles between neighbouring frequencies in which rest is stable.
-
-    Between two frequencies with equal curves, strips are matched in order, however steep; otherwise
-    all overlapping ones are joined.
-    """
+    """Return quadrangles between neighbouring frequencies in which rest is stable."""
     keys = ("index", "p", "multiplier", "stable_above")
     index, p, multiplier, above = (dataset[f"{prefix}{key}"].values for key in keys)
     intervals: list[list[tuple[float, float]]] = []

@@ -17,7 +17,7 @@ from pendmap.units import Units
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pendmap.charts.marks import Floats
+    from pendmap.charts.marks import Ends, Floats
 
 LATE: Final = 0.2
 """Last share of a trajectory, drawn dark: the motion after the transient."""
@@ -36,12 +36,14 @@ _EARLY, _LATE, _REST = "#93a7c1", "#1d3557", "#f8edd6"
 def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> Chart:
     """Return the four parts; late parts of curves are dark."""
     del cells
-    clock, time = names.clock(Units.of(facts(dataset))), dataset["time"].values
+    units, time = Units.of(facts(dataset)), dataset["time"].values
     ends = (float(time[0]), float(time[-1])) if time[-1] > time[0] else None
+    below = Axis(names.clock(units), ends)
+    sides = names.phase_plane((-math.pi, math.pi), plane.padded(dataset["velocity"].values), units)
     rows = [
-        [_history(dataset, Axis(clock if layer else "", ends))],
-        [_energy(dataset, Axis(clock, ends))],
-        [_phase(dataset), _section(dataset)],
+        [_history(dataset, below if layer else Axis("", ends))],
+        [_energy(dataset, below)],
+        [_phase(dataset, sides), _section(dataset, sides)],
     ]
     look: dict[str, Any] = {"heights": (0.32, 0.2, 0.48), "size": (8.6, 8.2)}
     chart = Chart("Trajectory", names.with_start(facts(dataset)), rows, **look)
@@ -49,38 +51,32 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
 
 
 def _history(dataset: xr.Dataset, clock: Axis) -> Panel:
-    marks: list[Mark] = _against_time(dataset, dataset["theta"].values)
+    marks, ends = _against_time(dataset, dataset["theta"].values)
     spans = resting(dataset)
     if len(spans):
         marks.append(Span(spans, colour=_REST, name="at rest"))
-    ends = _wide(dataset["theta"].values)
     title = "time history (dark: the last fifth)"
     return Panel("history", title, clock, Axis(names.ANGLE, ends, "angle"), marks)
 
 
-def _wide(values: Floats) -> tuple[float, float]:
-    low, high = holding(values)
-    return (low - FLAT, high + FLAT) if high - low < FLAT else (low, high)
-
-
 def _energy(dataset: xr.Dataset, clock: Axis) -> Panel:
     values = energy(dataset["theta"].values, dataset["velocity"].values, facts(dataset))
-    marks, ends, title = _against_time(dataset, values), _wide(values), "energy"
+    (marks, ends), title = _against_time(dataset, values), "energy"
     if ends[0] < UPSIDE_DOWN < ends[1]:  # above it the pendulum can rotate
         marks.append(Level(UPSIDE_DOWN, colour=QUIET, width=0.8, dash=(4.0, 3.0), order=0.0))
         title = "energy (dashed: upside down at rest)"
     return Panel("energy", title, clock, Axis("E / (m g l)", ends), marks)
 
 
-def _against_time(dataset: xr.Dataset, values: Floats) -> list[Mark]:
-    """Return a curve against time, its last part dark; a long one by its extremes per bin."""
-    time = dataset["time"].values
-    late = _late(time)
-    parts = ((slice(None, late + 1), _EARLY), (slice(late, None), _LATE))
-    return [
-        Line(*plane.envelope(time[part], values[part], MOST_DRAWN), colour=colour, width=1.0)
-        for part, colour in parts
-    ]
+def _against_time(dataset: xr.Dataset, values: Floats) -> tuple[list[Mark], Ends]:
+    """Return a curve against time, its last part dark, and limits; long ones by their extremes."""
+    time, late = dataset["time"].values, _late(dataset)
+    marks: list[Mark] = []
+    for part, colour in ((slice(None, late + 1), _EARLY), (slice(late, None), _LATE)):
+        curve = plane.envelope(time[part], values[part], MOST_DRAWN)
+        marks.append(Line(*curve, colour=colour, width=1.0))
+    low, high = holding(values)
+    return marks, (low - FLAT, high + FLAT) if high - low < FLAT else (low, high)
 
 
 def resting(dataset: xr.Dataset) -> Floats:
@@ -96,9 +92,9 @@ def resting(dataset: xr.Dataset) -> Floats:
     return within
 
 
-def _phase(dataset: xr.Dataset) -> Panel:
+def _phase(dataset: xr.Dataset, sides: tuple[Axis, Axis]) -> Panel:
     theta, velocity = dataset["theta"].values, dataset["velocity"].values
-    late, first, which = _late(dataset["time"].values), 0, ""
+    late, first, which = _late(dataset), 0, ""
     if dataset.sizes["period"] > MOST_PERIODS:
         beginning = dataset["section_time"].values[-1 - MOST_PERIODS // 2]
         late = first = int(np.searchsorted(dataset["time"].values, beginning))
@@ -110,27 +106,22 @@ def _phase(dataset: xr.Dataset) -> Panel:
         marks.append(Line(*curve.T, colour=colour, width=width))
     if (facts(dataset).get("stuck") or np.ptp(theta) == 0.0) and velocity[-1] == 0.0:
         marks.append(Points(plane.wrapped(theta[-1:]), velocity[-1:], colour=_LATE, size=3.5))
-    return Panel("phase", f"phase plane{which}", *_sides(dataset), marks)
+    return Panel("phase", f"phase plane{which}", *sides, marks)
 
 
-def _sides(dataset: xr.Dataset) -> tuple[Axis, Axis]:
-    speeds = plane.padded(dataset["velocity"].values)
-    return names.phase_plane((-math.pi, math.pi), speeds, Units.of(facts(dataset)))
-
-
-def _section(dataset: xr.Dataset) -> Panel:
+def _section(dataset: xr.Dataset, sides: tuple[Axis, Axis]) -> Panel:
     theta, velocity = dataset["section_theta"].values, dataset["section_velocity"].values
-    time = dataset["time"].values
-    late = np.asarray(dataset["section_time"].values >= time[_late(time)], bool)
+    beginning = dataset["time"].values[_late(dataset)]
+    late = np.asarray(dataset["section_time"].values >= beginning, bool)
     size = next(size for most, size in SIZES if theta.size <= most)
     marks = [
         Points(theta[which], velocity[which], colour=colour, size=size)
         for which, colour in ((~late, _EARLY), (late, _LATE))
     ]
-    title = "Poincaré section, once a period"
-    return Panel("section", title, *_sides(dataset), marks)
+    return Panel("section", "Poincaré section, once a period", *sides, marks)
 
 
-def _late(time: Floats) -> int:
+def _late(dataset: xr.Dataset) -> int:
     """Return the first index of the last part."""
+    time = dataset["time"].values
     return int(np.searchsorted(time, time[-1] - LATE * (time[-1] - time[0])))

@@ -72,26 +72,14 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
 ) -> Path:
     """Draw a result into a file.
 
-    Basin map: labels, attractors with their shares, and settle time; with unreliable labels the
-    settle time and net turns come first; with meaningless labels the net turns and the finite-time
-    exponent. Closed orbits: paths and points in the phase plane. Map over two parameters: kinds of
-    attractor, striped if several coexist, and the largest exponent. Bifurcation diagram:
-    stroboscopic angles, sweeps up and down, exponents. Critical curves: stable regions and their
-    boundaries. Melnikov's criterion: the threshold against the frequency. Trajectory: time history,
-    energy, phase plane, Poincare section. Exponent: growth along the start, the running mean, its
-    distribution. Lifetime: the survival curve with its tail, and the mean lifetime against the
-    start of the tail. Record: the angle with samples used and not used for fitting, findings, the
-    sampling intervals, the noise; of several runs a strip each. Identification: figures 4 to 7 of
-    Horton, Wiercigroch & Xu (2008) and their table 1. Comparison: record and model, the residual
-    with the noise, errors of periods and peaks. Diagnosis: residuals before and after, forecast
-    errors, the missing torque, the candidates, the first effect run by run.
+    The gallery of the manual shows what is drawn of each result. A selection of a dataset (a range,
+    every k-th value, reversed, transposed) is drawn with its own cells, coordinates and shares.
 
     Parameters
     ----------
     result : xarray.Dataset or other result
         Result of an analysis, of ``pendmap.load``, ``read_experiment``, ``identify``, ``compare``
-        or ``diagnose``. A selection of a dataset (a range, every k-th value, reversed, transposed)
-        is drawn with its own cells, coordinates and shares.
+        or ``diagnose``.
     path : str or path
         The file to write, ``.png``, ``.svg`` or ``.pdf``; an existing one is replaced.
     layer : str, optional
@@ -143,12 +131,12 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
     return style.written(path, make, dpi=dpi)
 
 
-def write_report(found: Discrepancy, path: str | os.PathLike[str]) -> Path:
+def write_report(result: Discrepancy, path: str | os.PathLike[str]) -> Path:
     """Write the report of a diagnosis with its figures.
 
     Parameters
     ----------
-    found : Discrepancy
+    result : Discrepancy
         Result of ``pendmap.diagnosis.diagnose``.
     path : str or path
         ``.html``: one file with the figures in it. ``.md``: Markdown, with the figures as ``.png``
@@ -175,4 +163,4 @@ def write_report(found: Discrepancy, path: str | os.PathLike[str]) -> Path:
             f"cannot write {str(target)!r}: suffix must be {known}, or it must be a folder, got "
             f"{target.suffix!r}"
         )
-    return report.write(found, target)
+    return report.write(result, target)

@@ -169,10 +169,7 @@ def _legend(axes: Axes, panel: Panel, *, always: bool) -> None:
 
 
 def _fit(axes: Axes) -> None:
-    """Lay out a figure; without a layout make axes smaller whose texts leave their place.
-
-    Colour bars are made smaller with their axes.
-    """
+    """Lay out a figure; without a layout make axes smaller whose texts leave their place."""
     figure: Any = axes.get_figure(root=True)
     if figure.get_layout_engine() is not None:
         figure.get_layout_engine().execute(figure)

@@ -26,27 +26,27 @@ SUFFIXES: Final = (".html", ".md")  # File suffixes of a report
 DPI: Final = 110.0  # Pixels per inch: sharp on a screen, with a file below a megabyte
 
 
-def figures(found: Discrepancy) -> dict[str, Figure]:
+def figures(result: Discrepancy) -> dict[str, Figure]:
     """Return the figures under the names that the report uses."""
-    made = {n: drawing.draw(chart, dpi=DPI) for n, chart in diagnosis.parts(found).items()}
-    cycles = diagnosis.cycles(found)
+    made = {n: drawing.draw(chart, dpi=DPI) for n, chart in diagnosis.parts(result).items()}
+    cycles = diagnosis.cycles(result)
     return made | ({} if cycles is None else {"figure_7": drawing.draw(cycles, dpi=DPI)})
 
 
-def write(found: Discrepancy, path: Path) -> Path:
+def write(result: Discrepancy, path: Path) -> Path:
     """Write the report of a diagnosis; see :func:`pendmap.render.write_report`."""
     with style.DRAWING, mpl.rc_context(style.RC):
-        pictures = {name: _png(drawn) for name, drawn in figures(found).items()}
+        pictures = {name: _png(drawn) for name, drawn in figures(result).items()}
     suffix = "" if path.is_dir() else path.suffix.lower()
     if suffix == ".html":
-        _put({path: report.as_html(found, pictures).encode()})
+        _put({path: report.as_html(result, pictures).encode()})
     elif suffix == ".md":
-        _put(_markdown(path, found, pictures, f"{path.stem}_"))
+        _put(_markdown(path, result, pictures, f"{path.stem}_"))
     else:
         with contextlib.nullcontext(path) if path.is_dir() else whole_folder(path) as folder:
             folder.mkdir(exist_ok=True)
-            files = _markdown(folder / "report.md", found, pictures)
-            files[folder / "report.html"] = report.as_html(found, pictures).encode()
+            files = _markdown(folder / "report.md", result, pictures)
+            files[folder / "report.html"] = report.as_html(result, pictures).encode()
             _put(files)
     return path
 
@@ -65,9 +65,9 @@ def _png(made: Figure) -> bytes:
 
 
 def _markdown(
-    path: Path, found: Discrepancy, pictures: dict[str, bytes], prefix: str = ""
+    path: Path, result: Discrepancy, pictures: dict[str, bytes], prefix: str = ""
 ) -> dict[Path, bytes]:
     """Return a Markdown file and its figures, whose names begin with a prefix."""
     names = {name: f"{prefix}{name}.png" for name in pictures}
     files = {path.with_name(names[name]): content for name, content in pictures.items()}
-    return files | {path: report.as_markdown(found, names).encode()}
+    return files | {path: report.as_markdown(result, names).encode()}

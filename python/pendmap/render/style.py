@@ -80,14 +80,10 @@ _FOUND: Final = re.compile(
 
 @functools.lru_cache(maxsize=4096)
 def typeset(text: str) -> str:
-    """Return a text of a chart with its symbols in italics, by mathtext.
+    """Return a text of a chart with its symbols in italics, by mathtext."""
 
-    >>> typeset("θr = 0.02,  p (g)")
-    '$θ_r$ = 0.02,  $p$ (g)'
-    """
-
-    def one(found: re.Match[str]) -> str:
-        return r"\$" if found[0] == "$" else SYMBOLS.get(found[0], found[0])
+    def one(result: re.Match[str]) -> str:
+        return r"\$" if result[0] == "$" else SYMBOLS.get(result[0], result[0])
 
     return _FOUND.sub(one, text.replace(r"\$", "$"))
 
@@ -167,10 +163,7 @@ def written(
     *,
     dpi: float | None = None,
 ) -> Path:
-    """Write the figure that ``make`` returns for a resolution into a file; return its path.
-
-    Files are undated, so that equal figures give equal files.
-    """
+    """Write the figure that ``make`` returns for a resolution into a file; return its path."""
     pixels, (low, high) = 200.0 if dpi is None else float(dpi), DPI
     if not low <= pixels <= high:
         raise InputError(f"dpi {pixels:g} is not between {low} and {high}")

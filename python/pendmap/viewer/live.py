@@ -33,15 +33,13 @@ class NobodyListensError(ViewerError):
 
 
 def check_address(address: str) -> tuple[str, int]:
-    """Return host and port of ``HOST:PORT``; raise an error if no viewer listens there.
-
-    A connection without a listener would block for 15 seconds without an error.
-    """
+    """Return host and port of ``HOST:PORT``; raise an error if no viewer listens there."""
     host, colon, port = address.rpartition(":")
     if not (colon and host and port.isdecimal() and 0 < int(port) <= _PORTS):
         raise InputError(f"address must be HOST:PORT, such as {ADDRESS}, got {address!r}")
     host = host.strip("[]")
     try:
+        # Without a listener the library would block for 15 seconds.
         with socket.create_connection((host, int(port)), _PROBE):
             pass
     except OSError as error:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 PALE: Final = (charts.INK, charts.QUIET)  # Colours that are invisible on a dark background
 IMAGES, AREAS, LINES, POINTS = 0.0, 10.0, 20.0, 30.0  # Drawing order, the lowest first
-STEPS: Final = 254  # Shades of an image of numbers, so that a class of it is one byte
+BYTE, CLASSES = 256, 20_000  # Classes that one byte holds; most values of an image of numbers
 
 
 def log(
@@ -93,6 +93,8 @@ def _points(mark: charts.Points, place: Place, order: float) -> Iterator[Part]:
                 "colors": [_shade(colour)],
                 "radii": rr.Radius.ui_points(radius),
             }
+            if mark.name and not leaf:  # shown where one points
+                look |= {"labels": [mark.name], "show_labels": False}
             yield leaf, rr.Points2D(at, draw_order=POINTS + order + 0.001 * k, **look), False
 
 
@@ -147,15 +149,14 @@ def _text(mark: charts.Text, place: Place, _: float) -> Iterator[Part]:
 
 def _image(mark: charts.Image, place: Place, order: float) -> Iterator[Part]:
     """Yield an image of classes; where one points, the viewer shows the name of the class."""
-    first = next(one for one in place.panel.marks if isinstance(one, charts.Image))
-    if mark.colours is None:
-        shown, classes = mark.values, list(mark.classes)
-    else:
+    shown, classes = mark.values, list(mark.classes)
+    if mark.colours is not None:
         shown, classes = _in_classes(mark.values, mark.colours)
     context: list[Any] = [(k, n, palette.parts(colour)) for k, (n, colour) in enumerate(classes)]
+    first = next(one for one in place.panel.marks if isinstance(one, charts.Image))
     if mark.colours is not None and mark is not first:
         context[0] = (0, "", (0, 0, 0, 0))  # cells without a value show the image below
-    kind = np.uint8 if len(context) <= STEPS + 2 else np.uint16
+    kind = np.uint8 if len(context) <= BYTE else np.uint16
     image: Any = shown.astype(kind)
     image = rr.SegmentationImage(image, opacity=1.0, draw_order=IMAGES + order)
     yield "", place.of_pixels(shown.shape, mark.x, mark.y), True
@@ -165,19 +166,25 @@ def _image(mark: charts.Image, place: Place, order: float) -> Iterator[Part]:
 
 def _in_classes(
     numbers: npt.NDArray[Any], look: charts.Colours
-) -> tuple[npt.NDArray[np.uint8], list[tuple[str, str]]]:
-    """Return an image of numbers in classes of a shade, 0 without a value, named by their means."""
+) -> tuple[npt.NDArray[np.int64], list[tuple[str, str]]]:
+    """Return an image of numbers in classes, one for each value to 4 digits; 0 without a value."""
     known = np.isfinite(numbers)
-    shade = np.where(known, position(look, np.where(known, numbers, look.low)), 0.0)
-    number = np.where(known, 1 + np.round(STEPS * shade), 0).astype(np.uint8)
-    count = np.bincount(number.ravel(), minlength=STEPS + 2)
-    total = np.bincount(number[known], numbers[known], minlength=STEPS + 2)
-    colours = palette.shades(look.map, np.linspace(0.0, 1.0, STEPS + 1))
+    size = np.abs(numbers[known], dtype=float)
+    values, place = np.empty(0), np.empty(0, dtype=int)
+    for digits in (4, 3, 2):
+        step = 10.0 ** (np.floor(np.log10(np.where(size > 0, size, 1.0))) + 1 - digits)
+        rounded = step * np.round(numbers[known] / step)
+        values, place = np.unique(rounded.astype(np.float32), return_inverse=True)
+        if values.size < CLASSES:
+            break
+    image = np.zeros(numbers.shape, dtype=np.int64)
+    image[known] = 1 + place
+    colours = palette.shades(look.map, position(look, values.astype(float)))
     classes = [("no value", palette.UNDECIDED)]
-    for k, colour in enumerate(colours, 1):
-        mean = typographic(f"{total[k] / count[k]:.4g}") if count[k] else ""
-        classes.append((mean, "#{:02x}{:02x}{:02x}".format(*colour)))
-    return number, classes
+    for value, colour in zip(values, colours, strict=True):
+        text = typographic(f"{value:.4g}")
+        classes.append((text, "#{:02x}{:02x}{:02x}".format(*colour)))
+    return image, classes
 
 
 def position(look: charts.Colours, numbers: npt.NDArray[Any]) -> Floats:

@@ -62,16 +62,13 @@ def save(  # noqa: PLR0913 (what it is, and how it is shown)
     content: str,
     known: Mapping[str, object],
 ) -> Path:
-    """Write a recording that ``log`` fills, with its name, identifier and known properties.
-
-    A layout holds for all recordings of an application, so each recording has its own. Data are
-    collected in memory: the library's own file output blocks forever when the disk is full.
-    """
+    """Write a recording that ``log`` fills, with its name, identifier and known properties."""
     application = f"pendmap {known['kind']} {content[:6]}"
     with whole_file(path, SUFFIXES) as part, strict():
         stream = identified(content, application)
         try:
             with stream:
+                # The library's own file output blocks forever when the disk is full.
                 memory = stream.memory_recording()
                 stream.send_blueprint(layout, make_active=False, make_default=True)
                 stream.send_recording_name(name)

@@ -220,11 +220,7 @@ def container(root: str, one: Motion, larger: float) -> rrb.Container:
 
 
 def log(stream: rr.RecordingStream, root: str, one: Motion, larger: float) -> None:
-    """Log one run: angles, residuals with the noise, and pendulums side by side.
-
-    The record is behind the pendulum of each model, at whose side the deviation of a fitted model
-    is magnified by ``larger``.
-    """
+    """Log one run: angles, residuals with the noise, and pendulums side by side."""
     moving.series(stream, f"{root}/angle/record", one.time, one.record, RECORD)
     path = f"{root}/pendulum"
     stream.log(f"{path}/data", moving.UPWARD, static=True)

@@ -151,12 +151,7 @@ def moving_parts(
     since: int = 0,
     every: int = 1,
 ) -> None:
-    """Log the pendulum in arm lengths, x to the right, y upward, and its phase point.
-
-    The effective gravity 1 + p cos(omega tau + phase) is that of a pivot at height
-    -(p / omega^2) cos(omega tau + phase). Samples before ``since`` are already logged and only used
-    for the trail; every ``every``-th of the others is logged.
-    """
+    """Log the pendulum in arm lengths, x to the right, y upward, and its phase point."""
     time, theta, velocity = motion
     omega, phase = float(attrs["omega"]), float(attrs.get("phase", 0.0))
     stroke = math.copysign(_stroke(attrs), float(attrs["p"]))

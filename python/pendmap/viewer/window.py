@@ -42,19 +42,19 @@ def open_viewer(path: str | os.PathLike[str]) -> int:
     if not _display():
         raise NoDisplayError(_elsewhere(file, _NO_DISPLAY))
     command = [str(_program()), "--bind", "127.0.0.1", "--port", str(_free_port()), str(file)]
-    with tempfile.TemporaryFile() as said:
+    with tempfile.TemporaryFile() as text:
         viewer = subprocess.Popen(  # noqa: S603 (our own viewer, a file that was checked)
             command,
             stdin=subprocess.DEVNULL,
-            stdout=said,
+            stdout=text,
             stderr=subprocess.STDOUT,
             start_new_session=True,
         )
         until = time.monotonic() + PATIENCE
         while time.monotonic() < until:
             if viewer.poll() is not None:
-                said.seek(0)
-                raise _ended(file, said.read().decode(errors="replace"))
+                text.seek(0)
+                raise _ended(file, text.read().decode(errors="replace"))
             time.sleep(0.05)
     _RUNNING.append(viewer)
     return viewer.pid
@@ -104,10 +104,10 @@ def _program() -> Path:
         program = Path(folder) / name
         if program.is_file():
             return program
-    found = shutil.which("rerun")
-    if found is None:
+    result = shutil.which("rerun")
+    if result is None:
         raise ViewerError("the viewer is not installed; it comes with the extra pendmap[viewer]")
-    return Path(found)
+    return Path(result)
 
 
 def _free_port() -> int:
@@ -117,9 +117,9 @@ def _free_port() -> int:
     return port
 
 
-def _ended(file: Path, said: str) -> ViewerError:
-    lines = [line.strip() for line in said.splitlines() if line.strip()]
+def _ended(file: Path, text: str) -> ViewerError:
+    lines = [line.strip() for line in text.splitlines() if line.strip()]
     reason = next((line for line in reversed(lines) if "rror" in line), "it gave no reason")
-    if any(word in said for word in ("EventLoopError", "X server", "WAYLAND_DISPLAY")):
+    if any(word in text for word in ("EventLoopError", "X server", "WAYLAND_DISPLAY")):
         return NoDisplayError(_elsewhere(file, "the display does not answer"))
     return ViewerError(f"the viewer ended at once: {reason[:300]}")

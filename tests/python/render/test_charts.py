@@ -120,12 +120,12 @@ def test_marks_of_a_recording_have_the_colours_of_the_chart(tmp_path: Path) -> N
         back = recorded(dataset, tmp_path)
         (drawing,) = drawings(registry.build(registry.ready(dataset, "record")))
         assert {f"/{place.root}" for place in drawing.places} <= set(back.views)
-        for place in drawing.places:
-            for mark in place.panel.marks:
-                shade = back.columns.get(f"/{place.root}/data/{mark.path}", {})
-                for kind in ("Points2D", "LineStrips2D"):
-                    if mark.path and mark.colour not in PALE and f"{kind}:colors" in shade:
-                        assert shade[f"{kind}:colors"][0] == [int(f"{mark.colour[1:]}ff", 16)]
+        pairs = [(place, mark) for place in drawing.places for mark in place.panel.marks]
+        for place, mark in pairs:
+            shade = back.columns.get(f"/{place.root}/data/{mark.path}", {})
+            for kind in ("Points2D", "LineStrips2D"):
+                if mark.path and mark.colour not in PALE and f"{kind}:colors" in shade:
+                    assert shade[f"{kind}:colors"][0] == [int(f"{mark.colour[1:]}ff", 16)]
 
 
 def test_a_panel_without_a_frame_is_a_page(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

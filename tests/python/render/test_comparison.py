@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import itertools
 from pathlib import Path
 
 import numpy as np
 import pytest
 from matplotlib import rc_context
-from matplotlib.text import Text
 
 from decays import decay, record
-from drawn import overlap, shown, written
+from drawn import assert_room, written
 from pendmap import Rig, virtual_rig
 from pendmap.charts import comparison
 from pendmap.comparison import Comparison, Ensemble, compare
@@ -43,12 +41,7 @@ def test_a_comparison_fits_a_screen_without_overlapping_text(count: int) -> None
     wide, high = figure.get_size_inches()
     assert high < 0.75 * wide
     assert high > 3
-    texts = [text.get_window_extent() for text in figure.findobj(Text) if shown(text)]
-    for one, other in itertools.combinations(texts, 2):
-        assert not overlap(one, other)
-    for box in texts:
-        assert box.y0 > -1
-        assert box.y1 < figure.bbox.y1 + 1
+    assert_room(figure)
     drawn = written(figure)
     if count > comparison.ALL:  # all in one panel; the held-out run and that of largest misfit
         ratios = figure.axes[0].get_lines()
@@ -91,12 +84,7 @@ def test_forced_runs_have_rows_in_which_nothing_overlaps(seconds: float, tmp_pat
         ]
         for figure in sheets:
             figure.canvas.draw()
-            texts = [text for text in figure.findobj(Text) if shown(text)]
-            boxes = [text.get_window_extent() for text in texts]
-            for one, other in itertools.combinations(range(len(texts)), 2):
-                said = texts[one].get_text(), texts[other].get_text()
-                assert not overlap(boxes[one], boxes[other]), said
-            assert max(box.x1 for box in boxes) < figure.bbox.x1 + 1
+            assert_room(figure)
     drawn = written(sheets[0])
     assert "escapes from a well" in drawn
     assert ("oscillation 2:0" in drawn) == (seconds > 60)

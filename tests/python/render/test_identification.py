@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import itertools
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +15,7 @@ from matplotlib.text import Text
 
 import pendmap
 from decays import decay, record
-from pendmap import render
+from drawn import assert_room
 from pendmap.charts import chart as charts
 from pendmap.charts import decrement, half_cycles, identification, marks, methods
 from pendmap.charts.names import signed
@@ -74,31 +73,6 @@ def drawn(name: str, size: tuple[float, float] | None = None, **given: Any) -> F
     return figure
 
 
-def assert_room(figure: Figure) -> None:
-    """Assert that no text is cut, covers another, or extends into another's panel."""
-    boxes = []
-    for part in figure.findobj(Text):
-        assert isinstance(part, Text)
-        if not part.get_visible() or not part.get_text().strip():
-            continue
-        box = part.get_window_extent()
-        if box.width == 0:
-            continue
-        assert figure.bbox.x0 - 1 <= box.x0, part.get_text()
-        assert box.x1 <= figure.bbox.x1 + 1, part.get_text()
-        assert figure.bbox.y0 - 1 <= box.y0, part.get_text()
-        assert box.y1 <= figure.bbox.y1 + 1, part.get_text()
-        boxes.append((part.get_text(), box))
-    panels = [("a panel", axes.get_window_extent()) for axes in figure.axes if axes.axison]
-    for (one, a), (other, b) in [
-        *itertools.combinations(boxes, 2),
-        *itertools.product(boxes, panels),
-    ]:
-        wide = min(a.x1, b.x1) - max(a.x0, b.x0)
-        high = min(a.y1, b.y1) - max(a.y0, b.y0)
-        assert not (wide > 1.5 and high > 1.5), (one, other)
-
-
 @pytest.mark.parametrize("name", RECORDS)
 def test_no_text_is_cut_or_covered(name: str) -> None:
     assert_room(drawn(name))
@@ -120,15 +94,6 @@ def test_text_has_room_in_any_size(size: tuple[float, float]) -> None:
 def test_unknown_parts_are_refused(parts: tuple[str, ...]) -> None:
     with pytest.raises(pendmap.InputError, match="must be among record, decrement"):
         drawn("whole", parts=parts)
-
-
-def test_files_are_complete(tmp_path: Path) -> None:
-    for suffix in render.SUFFIXES:
-        path = render.draw(report("begins under 12 degrees"), tmp_path / f"a{suffix}")
-        assert path.stat().st_size > 5000
-    with pytest.raises(pendmap.InputError, match="suffix must be"):
-        render.draw(report("begins under 12 degrees"), tmp_path / "a.gif")
-    assert len(list(tmp_path.iterdir())) == len(render.SUFFIXES)
 
 
 def test_the_pendulum_is_drawn() -> None:
@@ -217,8 +182,10 @@ def test_colours_of_methods_differ() -> None:
 
 def test_the_table_has_the_estimates() -> None:
     found = report("whole")
-    rows = identification.rows(found)
-    assert [len(row) for row in rows] == [len(identification.columns(found))] * len(rows)
+    (table, *_) = identification.table(found).panels[0].marks
+    assert isinstance(table, marks.Table)
+    rows = table.rows
+    assert {len(row) for row in rows} == {len(table.head)}
     assert rows[0][0] == "trajectory"
     assert float(rows[0][1].partition("(")[0]) == pytest.approx(6.2, abs=1e-3)
     said = typographic(estimate_text(Estimate(-0.0123456, 0.00123)))

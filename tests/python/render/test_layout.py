@@ -2,23 +2,37 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-from typing import Any
 
 import pytest
 import xarray as xr
 from matplotlib import rc_context
-from matplotlib.text import Text
 
 import motions
 import pendmap
 import synthetic
+from drawn import assert_room, made
 from pendmap.charts import basins as layers
 from pendmap.charts import plane, registry
 from pendmap.render import drawing, style
 
+FLAT = {"theta": (-1.6 * math.pi, 1.6 * math.pi), "velocity": (-3.0, 3.0)}
 MAPS = {
+    "usual": synthetic.painted(),
+    "one": synthetic.painted(synthetic.USUAL[:1], (1, 1)),
+    "none": synthetic.painted((), (6, 5)),
+    "three by two": synthetic.painted(synthetic.USUAL[:2], (3, 2)),
+    "twelve": synthetic.painted(synthetic.USUAL, (60, 60), undecided=200, failed=100),
+    "twelve unreliable": synthetic.painted(synthetic.USUAL, (60, 60), **synthetic.UNRELIABLE),
+    "wide": synthetic.painted(theta=(-4 * math.pi, 4 * math.pi), velocity=(-2.0, 2.0)),
+    "flat unreliable": synthetic.painted(**FLAT, **synthetic.UNRELIABLE),
+    "tall": synthetic.painted(theta=(-0.3, 0.4), velocity=(-6.0, 6.0)),
+    "two chaotic": synthetic.painted(synthetic.USUAL[10:12]),
+    "trajectory": motions.swing(periods=8, steps=20),
+    "friction": pendmap.simulate(pendmap.Pendulum(p=2.2, omega=0.6, theta_r=0.8), 1.0, 0.0, 40.0),
+    "torque": synthetic.painted(phase=0.25, torque=-0.5),
+}
+SHRUNK = {
     "usual": synthetic.painted(),
     "unreliable": synthetic.painted(**synthetic.UNRELIABLE),
     "torque": synthetic.painted(velocity=(-10.0, 10.0), p=0.0, torque=0.5),
@@ -30,49 +44,20 @@ MAPS = {
 }
 
 
-def figure_of(dataset: Any, share: float) -> Any:  # noqa: ANN401
+@pytest.mark.parametrize("name", MAPS)
+def test_no_text_is_cut_or_covered(name: str) -> None:
+    assert_room(made(MAPS[name]))
+
+
+@pytest.mark.parametrize("share", [0.3, 0.6])
+@pytest.mark.parametrize("name", SHRUNK)
+def test_texts_have_room_in_a_smaller_figure(name: str, share: float) -> None:
     with rc_context(style.RC):
-        chart = registry.build(dataset)
+        chart = registry.build(SHRUNK[name])
         wide, high = drawing.draw(chart).get_size_inches()
         figure = drawing.draw(chart, size=(share * wide, share * high), dpi=100.0)
         figure.canvas.draw()
-    return figure
-
-
-@pytest.mark.parametrize("share", [0.3, 0.6, 1.0])
-@pytest.mark.parametrize("name", MAPS)
-def test_no_text_is_cut_or_covered(name: str, share: float) -> None:
-    figure = figure_of(MAPS[name], share)
-    whole = figure.bbox
-    panels = [axes.get_window_extent() for axes in figure.axes]
-    boxes = []
-    beyond = {
-        label  # matplotlib does not draw it
-        for axes in figure.axes
-        for axis in (axes.xaxis, axes.yaxis)
-        for label, at in zip(axis.get_ticklabels(), axis.get_ticklocs(), strict=True)
-        if not min(axis.get_view_interval()) <= at <= max(axis.get_view_interval())
-    }
-    for text in figure.findobj(Text):
-        if not text.get_visible() or not text.get_text().strip() or text in beyond:
-            continue
-        box = text.get_window_extent()
-        # Within half a pixel, to which texts are placed.
-        assert whole.x0 - 0.5 <= box.x0, text.get_text()
-        assert box.x1 <= whole.x1 + 0.5, text.get_text()
-        assert whole.y0 - 0.5 <= box.y0, text.get_text()
-        assert box.y1 <= whole.y1 + 0.5, text.get_text()
-        boxes += [(text.get_text(), box)]
-        if not any(text in axes.texts for axes in figure.axes):  # a warning
-            assert not any(meet(box, panel) for panel in panels), text.get_text()
-    for (one, a), (other, b) in itertools.combinations(boxes, 2):
-        assert not meet(a, b), (one, other)
-
-
-def meet(one: Any, other: Any) -> bool:  # noqa: ANN401
-    wide = min(one.x1, other.x1) - max(one.x0, other.x0)
-    high = min(one.y1, other.y1) - max(one.y0, other.y0)
-    return bool(wide > 1 and high > 1)
+    assert_room(figure)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,6 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
-from matplotlib.colors import to_rgb
 
 import motions
 import synthetic
@@ -87,10 +86,3 @@ def test_the_first_layers_depend_on_the_map() -> None:
     assert basins.layers(synthetic.painted(**synthetic.UNRELIABLE)) == ("settle", "turns", "labels")
     assert basins.layers(motions.chaotic(cells=16, periods=3)) == ("turns", "exponent")
     assert basins.layers(synthetic.painted(synthetic.USUAL[10:12])) == ("labels", "turns")
-
-
-def test_a_legend_entry_has_the_colour_of_its_cells() -> None:
-    dataset = synthetic.painted(synthetic.USUAL, undecided=3, failed=2)
-    table = legend.colours(dataset)
-    for entry in legend.entries(dataset):
-        assert tuple(table[entry.id + 1] / 255) == pytest.approx(to_rgb(entry.colour))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,8 +11,7 @@ from hidden import once
 from pendmap import viewer
 from pendmap.charts.diagnosis import forecast
 from pendmap.diagnosis.result import as_text
-from pendmap.viewer import window
-from recordings import ReadBack
+from recordings import ReadBack, hanging, scalars
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -27,43 +25,14 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.usefixtures("strict_recordings")
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def found() -> Discrepancy:
     return once("quadratic_drag")
 
 
-@pytest.fixture
-def file(found: Discrepancy, tmp_path: Path) -> Path:
-    return viewer.record(found, tmp_path / "a.rrd")
-
-
-@pytest.fixture
-def back(file: Path) -> ReadBack:
-    return ReadBack(file)
-
-
-def scalars(back: ReadBack, entity: str) -> Floats:
-    return back.rows(entity, "Scalars:scalars")
-
-
-def hanging(back: ReadBack, bob: str, pivot: float) -> Floats:
-    """Return the angle of a pendulum whose arm has length 1."""
-    at = back.rows(bob, "Points2D:positions") - (pivot, 0.0)
-    assert np.allclose(np.hypot(*at.T), 1.0, atol=1e-5)
-    return np.arctan2(at[:, 0], -at[:, 1])
-
-
-def test_the_file_is_complete(file: Path) -> None:
-    command = [window._program(), "rrd", "verify", str(file)]  # noqa: SLF001 (the viewer itself)
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=600)
-    assert done.returncode == 0, done.stderr
-
-
-def test_two_recordings_of_one_diagnosis_are_equal(found: Discrepancy, file: Path) -> None:
-    other = viewer.record(found, file.with_name("b.rrd"))
-    command = [window._program(), "rrd", "compare", "--unordered", str(file), str(other)]  # noqa: SLF001
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=600)
-    assert done.returncode == 0, done.stderr
+@pytest.fixture(scope="module")
+def back(found: Discrepancy, tmp_path_factory: pytest.TempPathFactory) -> ReadBack:
+    return ReadBack(viewer.record(found, tmp_path_factory.mktemp("recording") / "a.rrd"))
 
 
 def test_residuals_are_those_of_the_gap(found: Discrepancy, back: ReadBack) -> None:

@@ -9,11 +9,12 @@ import rerun as rr
 import xarray as xr
 
 import synthetic
-from pendmap import InputError, viewer
+from pendmap import InputError, render, viewer
 from pendmap.viewer import chart
 from recordings import recorded
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
 pytestmark = pytest.mark.usefixtures("strict_recordings")
@@ -54,13 +55,21 @@ def test_errors_are_raised_although_the_library_would_only_warn(
     assert not list(tmp_path.iterdir())
 
 
-def test_bad_input_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"suffix must be \.rrd, got '\.txt'"):
-        viewer.record(synthetic.painted(), tmp_path / "a.txt")
-    with pytest.raises(InputError, match=r"kind None.*basins, .*trajectory"):
-        viewer.record(xr.Dataset(), tmp_path / "a.rrd")
-    with pytest.raises(InputError, match="list of starts"):
-        viewer.record(synthetic.painted().isel(theta=0, drop=True), tmp_path / "a.rrd")
-    with pytest.raises(FileNotFoundError, match="folder does not exist"):
-        viewer.record(synthetic.painted(), tmp_path / "no" / "a.rrd")
+@pytest.mark.parametrize(
+    ("dataset", "name", "says"),
+    [
+        (synthetic.painted(), "a.txt", r"suffix must be \.rrd, got '\.txt'"),
+        (synthetic.painted(), "no/a.rrd", "folder does not exist"),
+        (synthetic.painted().isel(theta=0, drop=True), "a.rrd", "list of starts"),
+        (xr.Dataset(), "a.rrd", r"kind None.*basins, .*trajectory"),
+    ],
+)
+@pytest.mark.parametrize("write", [viewer.record, render.draw])
+def test_bad_input_is_refused(
+    write: Callable[..., Path], dataset: xr.Dataset, name: str, says: str, tmp_path: Path
+) -> None:
+    if write is render.draw:
+        name, says = name.replace(".rrd", ".png"), says.replace("rrd", "png.*")
+    with pytest.raises((InputError, FileNotFoundError), match=says):
+        write(dataset, tmp_path / name)
     assert not list(tmp_path.iterdir())

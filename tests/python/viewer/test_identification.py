@@ -11,14 +11,14 @@ import pytest
 
 import decays
 import pendmap
-from pendmap import InputError, viewer
+from pendmap import viewer
 from pendmap.charts.identification import sheet
 from pendmap.charts.methods import drawn, look
 from pendmap.identification import identify
 from pendmap.identification.report import as_text
 from pendmap.viewer import runs, window
 from pendmap.viewer.chart import drawings
-from recordings import ReadBack
+from recordings import ReadBack, hanging, scalars
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -61,22 +61,8 @@ def back(report: IdentificationReport, tmp_path_factory: pytest.TempPathFactory)
     return ReadBack(viewer.record(report, folder / "a.rrd"))
 
 
-def scalars(back: ReadBack, entity: str) -> Floats:
-    return back.rows(entity, "Scalars:scalars")
-
-
-def hanging(back: ReadBack, bob: str, pivot: float) -> Floats:
-    """Return the angle of a pendulum whose arm has length 1."""
-    at = back.rows(bob, "Points2D:positions") - (pivot, 0.0)
-    assert np.allclose(np.hypot(*at.T), 1.0, atol=1e-5)
-    return np.arctan2(at[:, 0], -at[:, 1])
-
-
 def test_the_file_is_complete(report: IdentificationReport, tmp_path: Path) -> None:
-    file = viewer.record(report, tmp_path / "a.rrd")
-    assert file == tmp_path / "a.rrd"
-    assert list(tmp_path.iterdir()) == [file]
-    command = [window._program(), "rrd", "verify", str(file)]  # noqa: SLF001 (the viewer itself)
+    command = [window._program(), "rrd", "verify", str(viewer.record(report, tmp_path / "a.rrd"))]  # noqa: SLF001 (the viewer itself)
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=600)
     assert done.returncode == 0, done.stderr
 
@@ -223,21 +209,3 @@ def test_recordings_of_one_report_are_equal(
     third = ReadBack(viewer.record(other, tmp_path / "c.rrd"))
     ids = [one.recordings[0].recording_id for one in (back, again, third)]
     assert ids[0] == ids[1] != ids[2]
-
-
-def test_a_recording_is_complete_or_absent(
-    report: IdentificationReport, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    file = tmp_path / "a.rrd"
-    file.write_bytes(b"old")
-    with pytest.raises(InputError, match=r"suffix must be \.rrd, got '\.txt'"):
-        viewer.record(report, tmp_path / "a.txt")
-
-    def interrupted(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(runs, "_noise", interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        viewer.record(report, file)
-    assert file.read_bytes() == b"old"
-    assert list(tmp_path.iterdir()) == [file]

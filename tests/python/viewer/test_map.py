@@ -26,11 +26,13 @@ pytestmark = pytest.mark.usefixtures("strict_recordings")
 def values(back: ReadBack, entity: str) -> np.ndarray:
     """Return an image of numbers, read from the names of its classes; NaN without a value."""
     names = back.names(entity)
-    table = np.full(256, np.nan)
+    table = np.full(max(names) + 1, np.nan)
     for number, name in names.items():
         if number and name:
             table[number] = float(name.replace("\N{MINUS SIGN}", "-"))
-    return table[back.image(entity, "SegmentationImage", np.uint8)]
+    return table[
+        back.image(entity, "SegmentationImage", np.uint8 if len(names) <= 256 else np.uint16)
+    ]
 
 
 def colours(back: ReadBack, entity: str) -> dict[int, str]:
@@ -64,10 +66,9 @@ def test_a_map_is_read_back(tmp_path: Path) -> None:
     settle, periods = values(back, "/settle/data/steps"), dataset["settle_periods"].values
     assert (np.isnan(settle) == ((periods < 0) | (label < 0))).all()
     settled = ~np.isnan(settle)
-    np.testing.assert_allclose(settle[settled], np.maximum(periods[settled], 1), rtol=0.02)
+    assert (settle[settled] == np.maximum(periods[settled], 1)).all()
     turns = dataset["net_turns"].values.astype(float)
-    within = (label >= 0) & (np.abs(turns) < np.quantile(np.abs(turns[label >= 0]), 0.98))
-    assert (values(back, "/turns/data/turns") == turns)[within].all()
+    assert (values(back, "/turns/data/turns") == turns)[label >= 0].all()
 
 
 def test_every_class_has_its_name_and_colour(tmp_path: Path) -> None:
@@ -96,9 +97,10 @@ def test_attractors_are_drawn_at_their_points_and_named(tmp_path: Path) -> None:
     for number in dataset["id"].values:
         at = np.array(back.columns[f"/basin/data/attractors/{number}"]["Points2D:positions"][0])
         assert np.allclose(at, points[owner == number], atol=1e-6)
-    labels = [rows.get("Points2D:labels", [[]])[0] for rows in back.columns.values()]
-    for name in ("rest", "rotation 1:+1", "rotation 1:\N{MINUS SIGN}1", "oscillation 2:0"):
-        assert [name] in labels
+    names = ("rest", "rotation 1:+1", "rotation 1:\N{MINUS SIGN}1", "oscillation 2:0")
+    for number, name in enumerate(names, 1):
+        label = back.one(f"/basin/data/attractors/{number}", "Points2D:labels")
+        assert label.startswith(f"{name}, ")
 
 
 def test_transforms_bring_the_corners_of_the_map_to_the_frame(tmp_path: Path) -> None:
@@ -122,9 +124,7 @@ def test_legend_and_summary(tmp_path: Path) -> None:
     dataset = synthetic.painted(synthetic.USUAL[:4], (30, 40), undecided=12, **synthetic.UNRELIABLE)
     back = recorded(dataset, tmp_path)
     text = back.one("/legend", "TextDocument:text")
-    share = 100 * float(dataset["fraction"].values[1])
     line = next(line for line in text.splitlines() if line.startswith("- rotation 1:+1"))
-    assert line.startswith(f"- rotation 1:+1, {share:.1f} \N{PLUS-MINUS SIGN} ")
     assert line.endswith("twin of rotation 1:\N{MINUS SIGN}1: vermillion")
     assert "- undecided, 1 %: light grey" in text
     assert "labels unreliable: 20.7 % change under half the step or mirroring" in text
@@ -148,7 +148,7 @@ def test_every_view_has_an_origin_and_a_name(tmp_path: Path) -> None:
         "/summary": "Summary",
     }
     unreliable = synthetic.painted(**synthetic.UNRELIABLE)
-    assert recorded(unreliable, tmp_path).views["/basin"] == "Labels (unreliable)"
+    assert recorded(unreliable, tmp_path).views["/basin"] == "Basins of attraction (unreliable)"
     assert tabs_of(unreliable) == ["settle", "turns", "basin"]
 
 
@@ -165,7 +165,7 @@ def test_a_single_chaotic_attractor_is_recorded(tmp_path: Path) -> None:
     assert "/settle/data/steps" not in back.columns
     shown = values(back, "/exponent/data/exponent")
     exponent = dataset["finite_time_exponent"].values
-    assert np.abs(shown - exponent).max() < 0.05 * np.ptp(exponent)
+    np.testing.assert_allclose(shown, exponent, rtol=5.1e-4)
     assert (values(back, "/turns/data/turns") == dataset["net_turns"].values).all()
     at = back.columns["/basin/data/attractors/1"]["Points2D:positions"][0]
     assert len(at) == dataset.sizes["point"]

@@ -17,7 +17,7 @@ import synthetic
 from pendmap import InputError
 from pendmap.charts.plane import envelope
 from pendmap.viewer import trajectory
-from recordings import recorded
+from recordings import ReadBack, recorded
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -32,8 +32,12 @@ def swing() -> xr.Dataset:
     return motions.swing(periods=12, steps=200, p=1.7, omega=0.87)
 
 
-def test_a_trajectory_is_read_back(tmp_path: Path, swing: xr.Dataset) -> None:
-    back = recorded(swing, tmp_path)
+@pytest.fixture(scope="module")
+def back(swing: xr.Dataset, tmp_path_factory: pytest.TempPathFactory) -> ReadBack:
+    return recorded(swing, tmp_path_factory.mktemp("swing"))
+
+
+def test_a_trajectory_is_read_back(back: ReadBack, swing: xr.Dataset) -> None:
     theta, velocity = swing["theta"].values, swing["velocity"].values
     assert np.allclose(back.rows("/state/theta", "Scalars:scalars"), theta)
     assert np.allclose(back.rows("/state/omega", "Scalars:scalars"), velocity)
@@ -49,8 +53,7 @@ def test_a_trajectory_is_read_back(tmp_path: Path, swing: xr.Dataset) -> None:
     assert {"/pendulum/data/trail", "/phase/data/curve", "/summary"} <= set(back.columns)
 
 
-def test_the_pendulum_hangs_on_its_pivot(tmp_path: Path, swing: xr.Dataset) -> None:
-    back = recorded(swing, tmp_path)
+def test_the_pendulum_hangs_on_its_pivot(back: ReadBack, swing: xr.Dataset) -> None:
     bob = back.rows("/pendulum/data/bob", "Points2D:positions")
     pivot = back.rows("/pendulum/data/pivot", "Points2D:positions")
     arm = back.rows("/pendulum/data/arm", "LineStrips2D:strips")
@@ -61,9 +64,8 @@ def test_the_pendulum_hangs_on_its_pivot(tmp_path: Path, swing: xr.Dataset) -> N
 
 
 def test_the_pivot_s_acceleration_is_that_of_the_equation(
-    tmp_path: Path, swing: xr.Dataset
+    back: ReadBack, swing: xr.Dataset
 ) -> None:
-    back = recorded(swing, tmp_path)
     height = back.rows("/pendulum/data/pivot", "Points2D:positions")[:, 1]
     h = float(swing["time"][1] - swing["time"][0])
     every = 20  # the positions have single precision
@@ -72,15 +74,13 @@ def test_the_pivot_s_acceleration_is_that_of_the_equation(
     assert np.allclose(acceleration, drive, atol=0.06)
 
 
-def test_the_curve_does_not_cross_the_plane(tmp_path: Path, swing: xr.Dataset) -> None:
-    back = recorded(swing, tmp_path)
+def test_the_curve_does_not_cross_the_plane(back: ReadBack) -> None:
     curve = np.array(back.one("/phase/data/curve", "LineStrips2D:strips"))
     assert np.isnan(curve[:, 0]).any(), "this trajectory tumbles"
     assert np.nanmax(np.abs(np.diff(curve[:, 0]))) < 1.0
 
 
-def test_the_trail_ends_at_the_bob(tmp_path: Path, swing: xr.Dataset) -> None:
-    back = recorded(swing, tmp_path)
+def test_the_trail_ends_at_the_bob(back: ReadBack) -> None:
     trail = back.rows("/pendulum/data/trail", "LineStrips2D:strips")
     bob = back.rows("/pendulum/data/bob", "Points2D:positions")
     assert np.allclose(trail[:, -1], bob)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
 import sys
 import time
 from typing import TYPE_CHECKING
@@ -99,13 +98,3 @@ def test_a_viewer_that_runs_is_left_running(
     finally:
         os.kill(process, signal.SIGTERM)
         os.waitpid(process, 0)
-
-
-def test_the_real_viewer_is_found() -> None:
-    said = subprocess.run(
-        [window._program(), "--version"],  # noqa: SLF001
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert "rerun" in said.stdout
