@@ -6,13 +6,16 @@ after these imports, and shares nothing else with other commands.
 
 from __future__ import annotations
 
+import atexit
 import contextlib
+import gc
 import json
 import os
 import select
 import subprocess
 import sys
 import tempfile
+import threading
 from pathlib import Path
 from typing import Final
 
@@ -108,6 +111,8 @@ def _serve() -> None:
     for name in IMPORTED:
         with contextlib.suppress(ImportError):
             importlib.import_module(name)
+    gc.collect()
+    gc.freeze()  # a collection in a child copies no page of these imports
     for line in sys.stdin:
         request = json.loads(line)
         child = os.fork()
@@ -119,8 +124,16 @@ def _serve() -> None:
                 import traceback  # noqa: PLC0415 (of a failure alone)
 
                 traceback.print_exc()
-            # What the end of a process does: atexit, threads, buffers.
-            sys.exit(code)
+            # What the end of a process does, but for the destruction of every module, which takes
+            # longer than most commands.
+            for thread in threading.enumerate():
+                if thread is not threading.main_thread() and not thread.daemon:
+                    thread.join()
+            atexit._run_exitfuncs()  # noqa: SLF001 (no public name)
+            for stream in (sys.stdout, sys.stderr):
+                with contextlib.suppress(OSError, ValueError):
+                    stream.flush()
+            os._exit(code)
         _answer(child)
         _, status = os.waitpid(child, 0)
         _answer(os.waitstatus_to_exitcode(status))

@@ -60,12 +60,9 @@ def test_axes_may_be_tuples_and_counts_numpy_integers() -> None:
         ({"grid": 1.5}, r"grid must be a Grid, like 100, Grid\.square\(100\) .*, got 1\.5"),
         ({"pendulum": 0.6}, "pendulum must be a Pendulum, .*, got 0.6"),
         ({"threads": 1.5}, "threads must be a whole number from 1 to 256, got 1.5"),
-        ({"threads": 1000}, "threads must be a whole number from 1 to 256, got 1000"),
-        ({"progress": 3}, "progress must be a function of .*, got 3"),
         ({"tol": "a"}, "tol must be a number, got 'a'"),
         ({"max_periods": 10**14}, "max_periods must be a whole number from 1 to 2147.*, got 1"),
         ({"layer_periods": 0}, "layer_periods must be .*, got 0"),
-        ({"seed": 0.5}, "seed must be .*, got 0.5"),
         ({"check": "no"}, "check must be True or False, got 'no'"),
     ],
 )
