@@ -397,29 +397,6 @@ def orbits_near(
     model: Pendulum, steps: int, states: Sequence[tuple[float, float, int, bool | None]]
 ) -> list[tuple[int, list[_Pair]] | None]: ...
 def parameter_names(model: Pendulum) -> list[str]: ...
-def parameter_map(
-    model: Pendulum,
-    axes: tuple[_Range, _Range],
-    theta: _Floats,
-    velocity: _Floats,
-    each: int,
-    tol: float,
-    bound: int | None,
-    threads: int,
-    progress: _Progress | None = None,
-) -> ParameterMap: ...
-def bifurcation(
-    model: Pendulum,
-    axis: _Range,
-    theta: _Floats,
-    velocity: _Floats,
-    each: int,
-    first: tuple[float, float] | None,
-    tol: float,
-    bound: int | None,
-    threads: int,
-    progress: _Progress | None = None,
-) -> Bifurcation: ...
 def lyapunov(
     model: Pendulum,
     start: tuple[float, float],

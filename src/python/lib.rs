@@ -112,9 +112,7 @@ mod _core {
         maps::{BasinPlan, LabelledStarts, Reliability, Texture, TextureSum, Uncertainty, thinned},
         motion::{Trajectory, acceleration, advance, choose_steps, rates, simulate},
         orbits::{Orbit, OrbitSearch, orbits, orbits_near},
-        parameter_maps::{
-            Bifurcation, Followed, ParameterMap, bifurcation, parameter_map, parameter_names,
-        },
+        parameter_maps::{Bifurcation, Followed, ParameterMap, parameter_names},
         period, reckon, simd, simd_available,
         surveys::Survey,
         tongues::{CriticalAmplitudes, tongues},

@@ -2,19 +2,17 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use numpy::PyReadonlyArray1;
 use pendmap::attractor::Attractor;
 use pendmap::integrate::State;
 use pendmap::lanes::InstructionSet;
 use pendmap::maps::bifurcation as diagram;
-use pendmap::maps::cell::{Found, HINTED};
-use pendmap::maps::parameter_map::{self as maps, Request, parameter_map as search};
+use pendmap::maps::cell::Found;
+use pendmap::maps::parameter_map as maps;
 use pendmap::model::Angle;
 use pyo3::prelude::*;
 
-use super::convert::{Array, Attractor as PyAttractor, array, states};
-use super::long_calls::interruptible;
-use super::model::{Model, range};
+use super::convert::{Array, Attractor as PyAttractor, array};
+use super::model::Model;
 use super::raise;
 
 /// Names of parameters, each with its values at the places of an axis.
@@ -140,71 +138,6 @@ impl Followed {
 pub fn parameter_names(model: Model) -> PyResult<Vec<String>> {
     let pendulum = model.pendulum()?;
     Ok(pendulum.parameters().into_iter().map(|one| pendulum.name_of(one)).collect())
-}
-
-/// The attractors over a plane of two parameters: columns over all attractors of all cells, and over cells.
-#[pyfunction]
-#[pyo3(signature = (model, axes, theta, velocity, each, tol, bound, threads, progress=None))]
-#[allow(clippy::too_many_arguments)] // what Python passes, and the interpreter
-pub fn parameter_map(
-    py: Python<'_>,
-    model: Model,
-    axes: (RangeTuple, RangeTuple),
-    theta: PyReadonlyArray1<'_, f64>,
-    velocity: PyReadonlyArray1<'_, f64>,
-    each: usize,
-    tol: f64,
-    bound: Option<u32>,
-    threads: usize,
-    progress: Option<Py<PyAny>>,
-) -> PyResult<ParameterMap> {
-    let pendulum = model.pendulum()?;
-    let starts = states(&theta, &velocity)?;
-    let request = Request {
-        axes: [range(&pendulum, axes.0)?, range(&pendulum, axes.1)?],
-        starts,
-        each,
-        tol,
-        bound,
-        kept: HINTED,
-        threads,
-    };
-    let map = interruptible(py, progress.as_ref(), |control| search(&pendulum, &request, control))?;
-    ParameterMap::new(py, &map, true)
-}
-
-/// The attractors along one parameter, their points, and the motions followed up and down.
-#[pyfunction]
-#[pyo3(signature = (model, axis, theta, velocity, each, first, tol, bound, threads, progress=None))]
-#[allow(clippy::too_many_arguments)] // what Python passes, and the interpreter
-pub fn bifurcation(
-    py: Python<'_>,
-    model: Model,
-    axis: RangeTuple,
-    theta: PyReadonlyArray1<'_, f64>,
-    velocity: PyReadonlyArray1<'_, f64>,
-    each: usize,
-    first: Option<(f64, f64)>,
-    tol: f64,
-    bound: Option<u32>,
-    threads: usize,
-    progress: Option<Py<PyAny>>,
-) -> PyResult<Py<Bifurcation>> {
-    let pendulum = model.pendulum()?;
-    let starts = states(&theta, &velocity)?;
-    let request = diagram::Request {
-        axis: range(&pendulum, axis)?,
-        starts,
-        each,
-        first: first.map(|(theta, velocity)| [theta, velocity]),
-        tol,
-        bound,
-        threads,
-    };
-    let found = interruptible(py, progress.as_ref(), |control| {
-        diagram::bifurcation(&pendulum, &request, control)
-    })?;
-    Bifurcation::of(py, &found)
 }
 
 /// The descriptions of attractors in order, and the place of each attractor among them.

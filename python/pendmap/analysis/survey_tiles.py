@@ -75,8 +75,9 @@ class SurveyTiles:
 
     def run(self, work: Work, run: RunOptions) -> tuple[_core.Survey, list[bytes]]:
         """Compute the blocks that are missing; return the survey and the last result of each."""
-        state = work.once("survey", lambda: self.survey(None).state)
-        survey = self.survey(state)
+        whole = dataclasses.replace(self, threads=run.workers)
+        state = work.once("survey", lambda: whole.survey(None).state)
+        survey = whole.survey(state)
         threads, at_once = run.tiles(survey.blocks)
         work.job = dataclasses.replace(self, threads=threads, at_once=at_once)
         every = range(survey.blocks)
