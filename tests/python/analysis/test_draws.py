@@ -13,9 +13,11 @@ from scipy.optimize import brentq
 from scipy.stats import norm, truncnorm
 
 import pendmap
-from pendmap import Axis, Effect, Grid, InputError, Pendulum, Rig
+from pendmap import Axis, Effect, Grid, InputError, Pendulum, Rig, RunOptions
+from pendmap._core import Attractor
 from pendmap.analysis.draws import Draws, drawn
 from pendmap.analysis.draws.basins import basins_over
+from pendmap.analysis.orbit_table import described
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -31,7 +33,7 @@ def noted(names: Sequence[str], matrix: Any, **more: Any) -> dict[str, Any]:  # 
 def test_draws_have_the_mean_and_covariance_of_the_file() -> None:
     matrix = np.array([[4e-4, 3e-5, 0.0], [3e-5, 9e-6, 0.0], [0.0, 0.0, 1.0]])
     notes = noted(["w0", "torque", "phi[2]"], matrix)
-    found = drawn(Rig(w0=6.2, torque=0.1, notes=notes), 4000, SEED)
+    found = drawn(Rig(w0=6.2, torque=0.1, notes=notes), 4000, RunOptions(seed=SEED))
     assert found.names == ("w0", "torque")
     assert found.values.mean(axis=0) == pytest.approx([6.2, 0.1], abs=4 * 0.02 / math.sqrt(4000))
     assert np.cov(found.values.T) == pytest.approx(matrix[:2, :2], rel=0.1)
@@ -41,14 +43,19 @@ def test_draws_have_the_mean_and_covariance_of_the_file() -> None:
 
 def test_the_spread_between_runs_adds_to_the_variance() -> None:
     notes = noted(["w0"], [[9e-6]], between_runs={"w0": 0.004})
-    found = drawn(Rig(w0=6.2, notes=notes), 4000, SEED)
+    found = drawn(Rig(w0=6.2, notes=notes), 4000, RunOptions(seed=SEED))
     assert found.values.std() == pytest.approx(0.005, rel=0.05)
 
 
 def test_a_few_draws_are_the_first_of_many() -> None:
     rig = Rig(w0=6.2, notes=noted(["w0"], [[1e-4]]))
-    assert np.array_equal(drawn(rig, 5, SEED).values, drawn(rig, 50, SEED).values[:5])
-    assert not np.array_equal(drawn(rig, 5, SEED).values, drawn(rig, 5, SEED + 1).values)
+    assert np.array_equal(
+        drawn(rig, 5, RunOptions(seed=SEED)).values,
+        drawn(rig, 50, RunOptions(seed=SEED)).values[:5],
+    )
+    assert not np.array_equal(
+        drawn(rig, 5, RunOptions(seed=SEED)).values, drawn(rig, 5, RunOptions(seed=SEED + 1)).values
+    )
 
 
 @pytest.mark.parametrize("name", ["c_over_m", "Tr", "quadratic_drag.q"])
@@ -57,7 +64,7 @@ def test_damping_and_friction_are_drawn_from_a_gaussian_cut_off_at_0(name: str) 
     notes = {"covariance": own.pop("covariance")}
     drag = Effect("quadratic_drag", {"q": 0.01})
     rig = Rig(w0=6.2, effects=(drag,), notes=notes, **own)
-    values = drawn(rig, 4000, SEED).values[:, 0]
+    values = drawn(rig, 4000, RunOptions(seed=SEED)).values[:, 0]
     assert values.min() >= 0
     expected = truncnorm(-0.5, math.inf, loc=0.01, scale=0.02)
     assert values.mean() == pytest.approx(expected.mean(), abs=4 * expected.std() / math.sqrt(4000))
@@ -67,7 +74,7 @@ def test_damping_and_friction_are_drawn_from_a_gaussian_cut_off_at_0(name: str) 
 def test_parameters_of_either_sign_are_drawn_with_both() -> None:
     bias = Effect("bias_torque", {"torque": 0.0})
     rig = Rig(w0=6.2, effects=(bias,), notes=noted(["bias_torque.torque"], [[1e-4]]))
-    values = drawn(rig, 400, SEED).values
+    values = drawn(rig, 400, RunOptions(seed=SEED)).values
     assert 120 < (values < 0).sum() < 280
 
 
@@ -85,7 +92,7 @@ def test_parameters_of_either_sign_are_drawn_with_both() -> None:
 )
 def test_invalid_covariances_are_refused(notes: dict[str, Any], said: str) -> None:
     with pytest.raises(InputError, match=said):
-        drawn(Rig(w0=1e-3, notes=notes), 200, SEED)
+        drawn(Rig(w0=1e-3, notes=notes), 200, RunOptions(seed=SEED))
 
 
 def test_typed_parameters_are_not_drawn(tmp_path: Any) -> None:  # noqa: ANN401
@@ -93,8 +100,13 @@ def test_typed_parameters_are_not_drawn(tmp_path: Any) -> None:  # noqa: ANN401
     path = tmp_path / "model.toml"
     pendmap.save_model(Rig(w0=6.2, c_over_m=0.1, p=0.5, Omega=12.0, notes=notes), path)
     typed = {"gamma": 0.1, "stroke_mm": 30.0}
-    assert drawn(pendmap.load_model(path, typed), 2, SEED).names == ("w0", "Omega")
-    assert drawn(pendmap.load_model(path), 2, SEED).names == ("w0", "c_over_m", "p", "Omega")
+    assert drawn(pendmap.load_model(path, typed), 2, RunOptions(seed=SEED)).names == ("w0", "Omega")
+    assert drawn(pendmap.load_model(path), 2, RunOptions(seed=SEED)).names == (
+        "w0",
+        "c_over_m",
+        "p",
+        "Omega",
+    )
 
 
 def boundary(gamma: float, torque: float, velocity: float) -> float:
@@ -140,14 +152,23 @@ def test_a_boundary_that_shifts_with_a_normal_parameter_has_a_normal_distributio
     assert result.attrs["summary"].count("60 draws of rig_tilt.d") == 1
 
 
+ATTRACTORS = {
+    "rest": Attractor("rest", 1),
+    "rotation 1:+1": Attractor("rotation", 1, 1),
+    "oscillation 2:0": Attractor("oscillation", 2),
+}
+
+
 def painted(label: np.ndarray, names: Sequence[str]) -> xr.Dataset:
     """Return a map with the given labels."""
     rows, columns = label.shape
     count = len(names)
+    types = [ATTRACTORS[name.partition(" at ")[0]] for name in names]
     return xr.Dataset(
         {
             "label": (("velocity", "theta"), label.astype(np.int16)),
             "id": ("attractor", np.arange(1, count + 1)),
+            **described(types, "attractor"),
             "point_attractor": ("point", np.arange(1, count + 1)),
             "point_theta": ("point", np.arange(count, dtype=float)),
             "point_velocity": ("point", np.zeros(count)),
@@ -165,7 +186,7 @@ def gathered(maps: Sequence[xr.Dataset]) -> xr.Dataset:
     """Return the map over draws of these maps, one for each draw."""
     models = tuple(Pendulum(gamma=0.1 + 0.001 * k) for k in range(len(maps)))
     values = np.array([[one.gamma] for one in models])
-    draws = Draws(("gamma",), values, models, 0)
+    draws = Draws(("gamma",), values, models, RunOptions())
     own = dict(zip(models, maps, strict=True))
     return basins_over(maps[0], draws, lambda model, **_: own[model])
 
