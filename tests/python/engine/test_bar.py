@@ -10,7 +10,7 @@ import sys
 
 import pytest
 
-from pendmap.analysis.numerics import in_rounds
+from pendmap.analysis.run import in_rounds
 
 SHOWN = """
 import time
