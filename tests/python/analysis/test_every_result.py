@@ -15,9 +15,10 @@ from pendmap import Effect, Formula, Grid, InputError, Pendulum, Rig, render, vi
 from pendmap.files import facts
 
 if TYPE_CHECKING:
-    import xarray as xr
     from collections.abc import Callable
     from pathlib import Path
+
+    import xarray as xr
 
 DRAG = Effect("quadratic_drag", {"q": 0.02}, ci95={"q": (0.01, 0.03)}, probability=0.9)
 OWN = Formula("own_pull", "-k*sin(2*theta)", {"k": 2})
