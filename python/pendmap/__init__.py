@@ -67,97 +67,48 @@ ANALYSES = {
     "trajectory": (
         "simulate",
         ["simulate"],
-        "Integrate one trajectory: time history, phase plane, Poincaré section.",
+        "Integrate one trajectory, with its Poincaré section.",
     ),
     "basins": ("basins", ["basins", "basins_of"], "Map the basins of attraction."),
-    "basin_sweep": (
-        "sweep",
-        ["sweep"],
-        "Map basins along one or two parameters, with their attractors matched.",
-    ),
-    "parameter_map": (
-        "map",
-        ["parameter_map"],
-        "Map which attractors exist over two parameters.",
-    ),
+    "basin_sweep": ("sweep", ["sweep"], "Map basins along one or two parameters."),
+    "parameter_map": ("map", ["parameter_map"], "Map which attractors exist over two parameters."),
     "bifurcation": (
         "bifurcation",
         ["bifurcation"],
-        "Draw stroboscopic points against a parameter, with hysteresis.",
+        "Draw stroboscopic points against a parameter.",
     ),
-    "orbits": (
-        "orbit",
-        ["orbit"],
-        "Find all periodic orbits of one period and winding, stable and unstable.",
-    ),
-    "lyapunov": (
-        "lyapunov",
-        ["lyapunov"],
-        "Find the largest Lyapunov exponent of the attractor that a start reaches.",
-    ),
-    "lifetime": (
-        "lifetime",
-        ["lifetime"],
-        "Measure how long transient chaos lives, or find that it persists.",
-    ),
-    "tongues": (
-        "tongues",
-        ["tongues"],
-        "Find where rest loses its stability: critical curves in two planes.",
-    ),
-    "melnikov": (
-        "melnikov",
-        ["melnikov"],
-        "Compute the homoclinic threshold by Melnikov's criterion.",
-    ),
+    "orbits": ("orbit", ["orbit"], "Find all periodic orbits of one period and winding."),
+    "lyapunov": ("lyapunov", ["lyapunov"], "Find the largest Lyapunov exponent of an attractor."),
+    "lifetime": ("lifetime", ["lifetime"], "Measure how long transient chaos lives."),
+    "tongues": ("tongues", ["tongues"], "Find where rest loses its stability, in two planes."),
+    "melnikov": ("melnikov", ["melnikov"], "Compute the homoclinic threshold (Melnikov)."),
 }
 """Kind of result (also its module's name): command, functions that return it, description."""
 
 _OTHERS = {
-    "analysis.fractality": [
-        "BasinEntropy",
-        "UncertaintyExponent",
-        "basin_entropy",
-        "uncertainty_exponent",
-    ],
-    "analysis.grid": ["Axis", "Grid"],
-    "analysis.trajectories": ["advance"],
-    "analysis.varied": ["pendulum_of"],
-    "comparison.experiment": ["compare"],
-    "diagnosis.diagnose": ["diagnose"],
-    "engine.bar": ["ProgressBar"],
-    "errors": ["FitDiverged", "InputError"],
-    "files.dataset": ["save"],
-    "files.saved": ["load"],
-    "identification.experiment": ["identify"],
-    "model": [
-        "PRESETS",
-        "Effect",
-        "Formula",
-        "Pendulum",
-        "Rig",
-        "load_formulas",
-        "load_model",
-        "save_model",
-    ],
-    "model.effects": ["EffectDefinition", "EffectParameter", "effects"],
-    "records": [
-        "Experiment",
-        "Finding",
-        "NoiseFloor",
-        "Run",
-        "Segment",
-        "noise_floor",
-        "read_experiment",
-    ],
-    "render.axes": ["plot"],
-    "viewer": ["view"],
+    "analysis.fractality": "BasinEntropy UncertaintyExponent basin_entropy uncertainty_exponent",
+    "analysis.grid": "Axis Grid",
+    "analysis.trajectories": "advance",
+    "analysis.varied": "pendulum_of",
+    "comparison.experiment": "compare",
+    "diagnosis.diagnose": "diagnose",
+    "engine.bar": "ProgressBar",
+    "errors": "FitDiverged InputError",
+    "files.dataset": "save",
+    "files.saved": "load",
+    "identification.experiment": "identify",
+    "model": "PRESETS Effect Formula Pendulum Rig load_formulas load_model save_model",
+    "model.effects": "EffectDefinition EffectParameter effects",
+    "records": "Experiment Finding NoiseFloor Run Segment noise_floor read_experiment",
+    "render.axes": "plot",
+    "viewer": "view",
 }
-_HOMES = {
-    **{name: home for home, names in _OTHERS.items() for name in names},
+HOMES = {
+    **{name: home for home, names in _OTHERS.items() for name in names.split()},
     **{name: f"analysis.{kind}" for kind, (_, names, _) in ANALYSES.items() for name in names},
 }
-__all__ = sorted([*_HOMES, "__version__"])  # noqa: PLE0605 (a list)
+"""Module of each public name."""
+__all__ = sorted([*HOMES, "__version__"])  # noqa: PLE0605 (a list)
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 (any public name)
@@ -166,10 +117,10 @@ def __getattr__(name: str) -> Any:  # noqa: ANN401 (any public name)
         from importlib.metadata import version
 
         return version("pendmap")
-    if name in _HOMES:
+    if name in HOMES:
         import importlib
 
-        return getattr(importlib.import_module(f"pendmap.{_HOMES[name]}"), name)
+        return getattr(importlib.import_module(f"pendmap.{HOMES[name]}"), name)
     raise AttributeError(f"module 'pendmap' has no attribute {name!r}")
 
 

@@ -18,22 +18,14 @@ if TYPE_CHECKING:
 
 
 DIGITS: Final = 5  # Significant digits of a number of unknown uncertainty
-
 PLACES: Final = 10  # Largest number of decimal places of a number
-
 ERROR_DIGITS: Final = 2  # Significant digits of a standard error
-
 MOST_PLACES: Final = 15  # Largest number of decimal places of an estimate
-
 MINUS: Final = "\N{MINUS SIGN}"  # Minus sign of figures
-
 WIDTH: Final = 80  # Columns of a terminal
-
 _STYLE: Final = re.compile("\x1b\\[[0-9;]*m")  # Bold letters and colours of a terminal
-
 _GLUE: Final = "\N{NO-BREAK SPACE}"
 _GLUED: Final = re.compile(r"(?<=\d) (?=%|\+-)|(?<=\+-) |(?<= =) |(?<=\S) (?== )")
-
 LONG_AGO: Final = 1e3  # Time from which six digits are coarser than 1 ms, s
 
 

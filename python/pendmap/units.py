@@ -13,6 +13,16 @@ TIME, VELOCITY, RATE = -1, 1, 1
 """Powers of ``w0`` of a time, a velocity, and a rate like a Lyapunov exponent."""
 
 
+class _Word:
+    """A word that depends on the units: without dimensions, or in SI."""
+
+    def __init__(self, bare: str, si: str) -> None:
+        self._bare, self._si = bare, si
+
+    def __get__(self, units: Units | None, owner: type[Units]) -> str:
+        return self._bare if units is None or not units.si else self._si
+
+
 @dataclasses.dataclass(frozen=True)
 class Units:
     """Units of a result's numbers.
@@ -24,6 +34,15 @@ class Units:
     w0: float = 1.0  # sqrt(g / l), rad/s; 1 if nondimensional
     si: bool = False  # whether results are in SI
 
+    name = _Word("nondimensional", "SI")  # The attribute ``units`` of a dataset
+    clock = _Word("tau", "t")  # Symbol of time
+    derivative = _Word("dtheta/dtau", "dtheta/dt")  # Symbol of the velocity
+    of_time = _Word("1 / w0", "s")
+    of_velocity = _Word("1", "rad/s")
+    of_rate = _Word("1 per tau", "1/s")  # Unit of rates, such as Lyapunov exponents
+    per_time = _Word("per unit of tau", "per second")  # Unit of an exponent, in words
+    own_period = _Word("2 pi", "2 pi / w0")  # Period of small oscillations, used without drive
+
     def given(self, value: Any, power: float) -> Any:  # noqa: ANN401 (a number, or an array)
         """Convert a nondimensional number or array to these units."""
         return value * self.w0**power
@@ -31,36 +50,6 @@ class Units:
     def bare(self, value: Any, power: float) -> Any:  # noqa: ANN401 (likewise)
         """Convert a number or array in these units to a nondimensional one."""
         return value / self.w0**power
-
-    @property
-    def name(self) -> str:
-        """``SI`` or ``nondimensional``: the attribute ``units`` of a dataset."""
-        return "SI" if self.si else "nondimensional"
-
-    @property
-    def of_time(self) -> str:
-        """Unit of time."""
-        return "s" if self.si else "1 / w0"
-
-    @property
-    def of_velocity(self) -> str:
-        """Unit of velocity."""
-        return "rad/s" if self.si else "1"
-
-    @property
-    def of_rate(self) -> str:
-        """Unit of rates, such as Lyapunov exponents."""
-        return "1/s" if self.si else "1 per tau"
-
-    @property
-    def derivative(self) -> str:
-        """Symbol of the velocity as a derivative."""
-        return "dtheta/dt" if self.si else "dtheta/dtau"
-
-    @property
-    def clock(self) -> str:
-        """Symbol of time."""
-        return "t" if self.si else "tau"
 
     def spoken(self, velocity: str) -> str:
         """Return the text of a velocity with its unit, if it has one."""
@@ -73,16 +62,6 @@ class Units:
     def seconds(self, time: str) -> str:
         """Return the text of a time with its unit, if it has one."""
         return f"{time} s" if self.si else time
-
-    @property
-    def per_time(self) -> str:
-        """Unit of an exponent, in words."""
-        return "per second" if self.si else "per unit of tau"
-
-    @property
-    def own_period(self) -> str:
-        """Text of the period of small oscillations, used without drive."""
-        return "2 pi / w0" if self.si else "2 pi"
 
     @property
     def section(self) -> str:

@@ -137,8 +137,14 @@ SCHEMA = Schema(
 )
 
 
-def swing(pendulum, largest=3.0):
-    """Return the period ``4 K(sin(A/2)^2)`` of swings of the amplitude ``A`` without damping."""
+def swing(pendulum, largest: float = 3.0):
+    """Return the period ``4 K(sin(A/2)^2)`` of swings of the amplitude ``A`` without damping.
+
+    Parameters
+    ----------
+    largest : float
+        Largest amplitude, rad.
+    """
     largest = check_number("largest", largest)
     if not 0 < largest < math.pi:
         raise InputError(f"largest must be a number above 0 and below pi, got {largest:g}")
@@ -157,26 +163,15 @@ def swing(pendulum, largest=3.0):
 COMMAND = '''
 """``pendmap swing``: period against amplitude."""
 
-from pendmap.cli.parse.groups import group, new_command
-from pendmap.cli.parse.model_options import model_options
-from pendmap.cli.parse.options import option, output_options
-from pendmap.cli.parse.types import NUMBER
-from pendmap.cli.show import begin, show
-
-ANALYSIS = group("Analysis", "--largest 2")
+from pendmap.cli.analysis import analysis_command
 
 
-@new_command("swing", "pendmap swing --largest 2")
-@model_options
-@option("--largest", NUMBER, "Largest amplitude, rad.", 3.0, group=ANALYSIS)
-@output_options()
-def command(**given):
+@analysis_command(
+    "swing", "largest", example="--largest 2", examples=("pendmap swing --largest 2",)
+)
+def command(*_, **given):
     """Compute the period of free swings against their amplitude."""
-    model, outputs = begin(given, "swing")
-
-    from pendmap.analysis.swing import SCHEMA, swing
-
-    show(swing(model, given["largest"]), outputs, SCHEMA)
+    return given
 '''
 CHART = '''
 """Period of free swings against their amplitude."""

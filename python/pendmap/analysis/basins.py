@@ -161,12 +161,13 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         The initial conditions at ``tau = 0``, or how many cells each side of the default window
         has: [-pi, pi] x [-3, 3], with a rig [-pi, pi] x [-3 w0, 3 w0]. By default 1000.
     tol : float
-        The 95th percentile, over a sample of the starts, of the difference that halving the step
-        makes after 5 periods; 1e-13 to 1e-2.
+        Error of a state after 5 periods; 1e-13 to 1e-2. It is the 95th percentile, over a sample of
+        the starts, of the difference that halving the step makes.
     max_periods : int, optional
-        Periods after which a start is undecided; by default those in which damping shrinks a free
-        motion by exp(-200), ``400 / (gamma T)``, from 4000 to a million; with dry friction
-        ``theta_r`` adds to ``gamma``. Undecided starts are followed for ``200 / (abs(lambda) T)``
+        Periods after which a start is undecided; by default 4000, more where damping is small, less
+        if chaos coexists. The default are the periods in which damping shrinks a free motion by
+        exp(-200), ``400 / (gamma T)``, from 4000 to a million; with dry friction ``theta_r`` adds
+        to ``gamma``. Undecided starts are followed for ``200 / (abs(lambda) T)``
         where ``lambda``, the exponent of the slowest attractor found, makes that longer. Where
         chaos coexists with other attractors ten times the longest settling time seen. A bound
         that is given is one for the search for attractors too, from 1000 periods on.
@@ -176,13 +177,13 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     threads : int, optional
         Number of threads; by default one per processor. The result does not depend on it.
     seed : int
-        Shifts the samples of starts.
+        Shifts the samples of starts, and draws the models of ``draws``.
     check : bool
         Whether to check labels of a sample with half the step and mirrored, and to measure the
         share of starts whose label changes nearby.
     draws : int, optional
-        Number of models drawn from the model's ``[covariance]`` with ``seed``, each mapped too:
-        the probability of each outcome in each cell, and the uncertainty due to the parameters.
+        Number of models drawn from the ``[covariance]`` of the model with ``seed``: the uncertainty
+        of the result. Each is mapped too, for the probability of each outcome in each cell.
     store : str or path, optional
         A Zarr store, a path or an address of fsspec like ``s3://bucket/map.zarr``: the map is
         computed in tiles of about 2^20 starts, and each is stored as it is done. The result reads

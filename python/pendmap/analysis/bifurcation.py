@@ -63,7 +63,7 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     ranges: Mapping[str, ArrayLike],
     *,
     start: tuple[float, float] | None = None,
-    starts: int = cell_search.STARTS,
+    starts: int = 9,
     box: Grid | None = None,
     tol: float = 1e-6,
     max_periods: int | None = None,

@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from pendmap.units import Units
 
 CHAOS_PERIODS = ("time for which the chaos was not captured", "0: no chaos")  # Name, comment
-STARTS = 9  # Default number of initial conditions of a cell
 _SPREAD = 1000  # Cells on each side of the default box, without effect
 _PLASTIC = 1.324717957244746
 """Plastic number, whose powers give an even additive recurrence in two dimensions."""

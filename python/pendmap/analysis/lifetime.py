@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     from pendmap.model import Pendulum, Rig
 
 
-_STARTS: Final = 40_000  # Default number of starts
 _MOST_STARTS: Final = 10_000_000  # Largest number of starts
 _SURE: Final = 3.0
 """Excess of the exponent over the escape rate that shows transient chaos, standard errors."""
@@ -115,7 +114,7 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
     theta: ArrayLike | None = None,
     velocity: ArrayLike | None = None,
     *,
-    starts: int = _STARTS,
+    starts: int = 40_000,
     from_period: int | None = None,
     max_periods: int | None = None,
     tol: float = 1e-6,
@@ -150,10 +149,11 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
         Starts at ``tau = 0``; by default drawn at random from [-pi, pi] x [-3, 3], with a rig from
         [-pi, pi] x [-3 w0, 3 w0].
     starts : int
-        Number of starts drawn; 100 to ten million.
+        Number of starts drawn, from angles -pi to pi and velocities -3 to 3 (in SI times ``w0``);
+        100 to ten million.
     from_period : int, optional
-        Beginning of the tail. By default twice the earliest period from which two tests (of a
-        Weibull shape, and of a rate that changes) find it exponential.
+        Period at which the exponential tail begins; by default twice the earliest from which two
+        tests (of a Weibull shape, and of a rate that changes) find it exponential.
     seed : int
         Draws the starts, and the models of ``draws``.
     draws : int, optional

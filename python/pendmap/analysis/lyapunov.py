@@ -112,14 +112,16 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
     ----------
     pendulum : Pendulum or Rig
         The model; with a rig velocities are in rad/s and exponents per second.
-    theta, velocity : float
-        State at ``tau = 0``: angle in rad, velocity ``d theta / d tau``.
+    theta : float
+        Angle at the start, rad.
+    velocity : float
+        Velocity at the start, ``d theta / d tau``; with a rig ``d theta / d t``.
     precision : float
         Ratio of standard error to exponent at which averaging of chaos ends; above 0, up to 0.5.
     max_periods : int, optional
-        Periods within which an attractor must capture the start, by default as for
-        :func:`pendmap.basins`, and largest number for which each trajectory of an ensemble is
-        followed, by default 20,000 (without damping 2000).
+        Periods within which an attractor must capture the start, and for which each trajectory of
+        an ensemble is followed at most; by default 4000, more where damping is small, and 20,000
+        (without damping 2000).
     seed : int
         Chooses the trajectories on a chaotic attractor.
     tol, threads, progress

@@ -117,7 +117,9 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
     draws : int, optional
         As for :func:`pendmap.basins`; adds how far orbits move, and in how many draws they exist
         and are stable.
-    threads, seed, progress
+    seed : int
+        Draws the models of ``draws``.
+    threads, progress
         As for :func:`pendmap.basins`.
 
     Returns

@@ -99,7 +99,7 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     pendulum: Pendulum | Rig,
     ranges: Mapping[str, ArrayLike],
     *,
-    starts: int = cell_search.STARTS,
+    starts: int = 9,
     box: Grid | None = None,
     tol: float = 1e-6,
     max_periods: int | None = None,

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 _Row: TypeAlias = _core.CriticalAmplitudes
 """Critical amplitudes, multipliers and fold at one frequency."""
-OMEGA, P_MAX = (0.5, 3.0, 200), 6.0  # Default frequencies and largest amplitude
+OMEGA = (0.5, 3.0, 200)  # Default frequencies
 _OF_P = "1", "amplitude of the drive over gravity"  # Unit and meaning of p
 _STABLE = {0: "unstable", 1: "stable"}  # Meanings of a flag
 _NO_REST = _core.CriticalAmplitudes.no_rest()  # Result for a rest that is no solution
@@ -112,7 +112,7 @@ SCHEMA = Schema(
 def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     pendulum: Pendulum | Rig,
     omega: ArrayLike | None = None,
-    p_max: float = P_MAX,
+    p_max: float = 6.0,
     *,
     plane: str = "omega-p",
     inverted: bool = True,
@@ -151,10 +151,10 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
         Frequencies ``Omega/w0`` in ascending order, by default 200 from 0.5 to 3,
         evenly in omega or, for the plane of eq. 1.4, in 1/omega^2.
     p_max : float
-        Largest amplitude, up to 50,000 times the square of the lowest frequency: there motions
-        about rest grow nearly beyond the range of numbers in a period.
+        Largest amplitude. It may be up to 50,000 times the square of the lowest frequency: there
+        motions about rest grow nearly beyond the range of numbers in a period.
     plane : str
-        In which plane a figure shows them: ``omega-p``, or ``e-alpha2``, that of eq. 1.4.
+        Plane of a figure: ``omega-p`` of eq. 1.2, or ``e-alpha2`` of eq. 1.4.
     inverted : bool
         Whether to find where inverted rest is stable too.
     refine : bool
@@ -162,7 +162,9 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
         figures.
     draws : int, optional
         As for :func:`pendmap.basins`; adds the band of each critical amplitude.
-    threads, seed, progress
+    seed : int
+        Draws the models of ``draws``.
+    threads, progress
         As for :func:`pendmap.basins`.
 
     Returns

@@ -133,18 +133,19 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
         Times of the samples, ascending, from 0 up to ``until``; the trajectory ends with the last.
         States are those of the integrator's dense output, as exact as its steps.
     tol : float
-        The error of each step is tightened until a 16 times smaller one changes the state after 5
-        periods (or at the end, if that is sooner) by no more than this, or until rounding forbids
-        more, which the summary reports; 1e-13 to 1e-2. ``reached_error`` is the error reached,
-        ``end_error`` the difference at the end.
+        Error of the state after 5 periods, or at the end if that is sooner; 1e-13 to 1e-2. The
+        error of each step is tightened until a 16 times smaller one changes that state by no more,
+        or until rounding forbids more, which the summary reports. ``reached_error`` is the error
+        reached, ``end_error`` the difference at the end.
     samples : int, optional
-        Samples a period. By default 64, without ``lyapunov`` in a quick motion as many as a smooth
-        curve needs, up to 200,000 in all; fewer than 64 where that would be more than two million.
+        Samples a period; by default 64 or more. Without ``lyapunov`` a quick motion has as many as
+        a smooth curve needs, up to 200,000 in all; fewer than 64 where that would be more than two
+        million.
         The motion does not depend on them, the batches of an exponent do.
     lyapunov : bool
-        Whether to compute the largest Lyapunov exponent of this stretch of trajectory, with a
-        standard error from the spread of 20 batches, the first tenth left out (from the time
-        ``exponent_from`` to ``exponent_to``). It is the exponent of an attractor only if the
+        Whether to compute the largest Lyapunov exponent of this stretch of trajectory. Its standard
+        error is that of 20 batches, the first tenth left out (from the time ``exponent_from`` to
+        ``exponent_to``). It is the exponent of an attractor only if the
         trajectory was on it all that time: a chaotic transient has a positive one, wherever it
         ends. :func:`pendmap.lyapunov` computes that of the attractor. Sticking may give none.
     live : callable, optional

@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
-import functools
+import contextlib
+import dataclasses
 import importlib
 import inspect
 from typing import TYPE_CHECKING, Any
 
 from pendmap import ANALYSES
-from pendmap.cli.parse.groups import new_command
+from pendmap.cli.parse.groups import group, new_command
 from pendmap.cli.parse.model_options import model_options
-from pendmap.cli.parse.options import (
-    added,
-    machine_options,
-    output_options,
-    store_options,
-    worker_options,
-)
+from pendmap.cli.parse.options import added, output_options, simd_option, store_options
+from pendmap.cli.parse.signature import options_of, parameters
+from pendmap.cli.parse.types import Address
 from pendmap.cli.show import begin, made_here, show
-from pendmap.cli.stored import Kept
+from pendmap.cli.text import say
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     import click
 
@@ -35,38 +32,65 @@ Writes {0}.nc, {0}.png and {0}.rrd if no output is named."""
 
 def analysis_command(
     name: str,
-    *options: Decorator,
+    *options: Decorator | str,
     examples: Sequence[str],
+    example: str = "",
     model: Decorator = model_options,
     stored: bool = False,
 ) -> Callable[[Callable[..., dict[str, Any]]], click.Command]:
     """Return a decorator that makes a command of :data:`pendmap.ANALYSES`.
 
-    The decorated function takes model, outputs and the values of ``options``, and returns the
+    ``options`` are options, and names of parameters of the analysis (:func:`options_of`), which
+    ``example`` shows. The decorated function takes model, outputs and their values, and returns the
     keyword arguments of the analysis; its docstring is the help, which ``examples`` end. What is
     ``stored`` is computed in tiles, by workers if they are given, and kept in a store if ``--out``
     names one.
     """
     kind, function = next((k, own[0]) for k, (which, own, _) in ANALYSES.items() if which == name)
+    path = f"analysis.{kind}.{function}"
+    own_group = group("Analysis", example)
 
     def make(prepare: Callable[..., dict[str, Any]]) -> click.Command:
         def run(**given: Any) -> None:  # noqa: ANN401 (the options)
-            kept = Kept.take(given) if stored else None
-            pendulum, outputs = begin(given, name, going_on=kept is not None and kept.goes_on)
+            engine = [given.pop(key, None) for key in ("resume", "workers", "scheduler")]
+            pendulum, outputs = begin(given, name, going_on=bool(engine[0]))
             arguments = prepare(pendulum, outputs, **given)
             module = importlib.import_module(f"pendmap.analysis.{kind}")
-            analysis = functools.partial(getattr(module, function), pendulum, **arguments)
-            if kept is not None:
-                kept.run(analysis, outputs, name, module.SCHEMA)
-                return
-            with outputs.progress(name) as progress, made_here():
-                dataset = analysis(progress=progress)
-            show(dataset, outputs, module.SCHEMA)
+            store = outputs.store if stored else None
+            if arguments.get("draws") and not isinstance(store, Address):
+                store = None  # draws are written when all are computed
+            with _workers(*engine[1:], quiet=outputs.quiet) as executor, made_here():
+                if stored:
+                    arguments |= {"store": store, "resume": engine[0], "executor": executor}
+                with outputs.progress(name) as progress:
+                    if "progress" in parameters(path):
+                        arguments["progress"] = progress
+                    dataset = getattr(module, function)(pendulum, **arguments)
+            if store is None:
+                show(dataset, outputs, module.SCHEMA)
+            else:
+                show(dataset, dataclasses.replace(outputs, out=None), module.SCHEMA, [str(store)])
 
         text = inspect.cleandoc(prepare.__doc__ or "") + WRITES.format(name)
-        kept = (store_options, worker_options) if stored else ()
+        own = [options_of(path, o, own_group) if isinstance(o, str) else o for o in options]
+        threads = [options_of(path, "threads")] if "threads" in parameters(path) else []
+        kept = [store_options] if stored else []
         files = output_options(stored=stored)
-        decorate = added(model, *options, *kept, machine_options, files)
+        decorate = added(model, *own, *kept, *threads, simd_option, files)
         return new_command(name, *examples, text=text)(decorate(run))
 
     return make
+
+
+@contextlib.contextmanager
+def _workers(count: int | None, scheduler: str | None, *, quiet: bool) -> Iterator[Any]:
+    """Yield the executor of --workers or --scheduler, or None; say if there are no workers."""
+    if scheduler is None and count is None:
+        yield None
+        return
+    from pendmap.engine import executor_of
+
+    with executor_of(scheduler, count) as executor:
+        if not quiet and not executor.nthreads():
+            say(f"{scheduler} has no workers yet: waiting for them.", err=True)
+        yield executor

@@ -9,7 +9,7 @@ import click
 from pendmap.cli.analysis import analysis_command
 from pendmap.cli.parse.groups import START
 from pendmap.cli.parse.model_options import varied_model_options
-from pendmap.cli.parse.options import option, search_options
+from pendmap.cli.parse.options import option
 from pendmap.cli.parse.types import NUMBER
 
 
@@ -17,7 +17,7 @@ from pendmap.cli.parse.types import NUMBER
     "bifurcation",
     option("--theta", NUMBER, "Angle from which both sweeps start, rad.", group=START),
     option("--velocity", NUMBER, "Velocity of that start, in SI rad/s.", group=START),
-    search_options,
+    "starts tol max_periods seed",
     examples=(
         "pendmap bifurcation --vary p 0.9:2:2000",
         "pendmap bifurcation --p 0.9:2:500 --theta-r 0.02 --out bifurcation.pdf",

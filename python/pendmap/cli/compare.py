@@ -6,21 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 from pendmap.cli.parse.groups import argument, group, new_command
 from pendmap.cli.parse.model_options import rig_from
-from pendmap.cli.parse.options import (
-    option,
-    output_options,
-    reading_options,
-    seed_option,
-    threads_option,
-)
-from pendmap.cli.parse.types import NUMBER, whole
+from pendmap.cli.parse.options import output_options, simd_option
+from pendmap.cli.parse.signature import options_of
 from pendmap.cli.show import Outputs, write_all
 from pendmap.cli.text import first_of_all
 from pendmap.errors import instruction_set
 
 if TYPE_CHECKING:
     from pathlib import Path
-
 
 _ENSEMBLE = group("Ensemble", "--members 1000 --spread 0.02")
 
@@ -32,30 +25,17 @@ _ENSEMBLE = group("Ensemble", "--members 1000 --spread 0.02")
 )
 @argument("model", "MODEL")
 @argument("path", "EXPERIMENT")
-@option(
-    "--members", whole(20, 100_000), "Ensemble members for each forced run.", 400, group=_ENSEMBLE
-)
-@option(
-    "--spread",
-    NUMBER,
-    "Their spread about the measured start, rad, and over w0.",
-    0.01,
-    group=_ENSEMBLE,
-)
-@seed_option("Draws them.")
-@threads_option
-@reading_options
+@options_of("comparison.forced.Ensemble", "members spread seed", _ENSEMBLE)
+@options_of("comparison.experiment.compare", "threads rate=rate_hz")
+@simd_option
 @output_options((".nc",), recording=False)
-def command(  # noqa: PLR0913 (an option each)
+def command(
     *,
     model: Path,
     path: Path,
-    members: int,
-    spread: float,
-    seed: int,
     threads: int | None,
     rate_hz: float | None,
-    **given: Any,  # noqa: ANN401 (outputs)
+    **given: Any,  # noqa: ANN401 (outputs, ensemble)
 ) -> None:
     """Simulate a MODEL beside every run of an EXPERIMENT.
 
@@ -72,7 +52,7 @@ def command(  # noqa: PLR0913 (an option each)
 
     outputs = Outputs.take(given, "compare", reads=[model, *files_of(path)])
     rig = rig_from(model)
-    ensemble = Ensemble(members, spread, seed)
+    ensemble = Ensemble(**given)
     with outputs.progress("compare") as progress:
         experiment = read_experiment(path, rate_hz=rate_hz)
         comparison = compare(rig, experiment, ensemble=ensemble, threads=threads, progress=progress)

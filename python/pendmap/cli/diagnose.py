@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 from pendmap.cli.parse.groups import OUTPUT, argument, group, new_command
 from pendmap.cli.parse.model_options import rig_from
-from pendmap.cli.parse.options import RESULTS, option, output_options, reading_options
-from pendmap.cli.parse.types import EFFECT, FILE, REPORT, REPORTS, whole
+from pendmap.cli.parse.options import RESULTS, option, output_options, simd_option
+from pendmap.cli.parse.signature import options_of
+from pendmap.cli.parse.types import EFFECT, FILE, REPORT, REPORTS
 from pendmap.cli.show import Outputs, write_all
 from pendmap.cli.text import table
 from pendmap.errors import instruction_set, named
@@ -30,23 +31,20 @@ _FIT = group("Candidates", "--max-effects 1 --without magnet")
     "pendmap diagnose hidden --model rig.toml --report report",
 )
 @argument("path", "EXPERIMENT")
+@options_of(
+    "diagnosis.diagnose.diagnose",
+    "model max_effects without rate=rate_hz",
+    _FIT,
+    model=FILE,
+    without=EFFECT,
+)
 @option(
-    "--model model_path",
+    "--effects formulas",
     FILE,
-    "Model to begin with, in SI: .toml.  [default: viscous damping and Coulomb friction]",
-    metavar="FILE",
+    "Further candidates: [[formula]] of a .toml.",
     group=_FIT,
 )
-@option("--max-effects", whole(0, 6), "Effects added at most, 0 to 6.", 3, group=_FIT)
-@option("--without", EFFECT, "Leave this effect out; may be repeated.", multiple=True, group=_FIT)
-@option(
-    "--effects effects_path",
-    FILE,
-    "User-defined candidates in addition to the library's: [[formula]] of a .toml.",
-    metavar="FILE",
-    group=_FIT,
-)
-@reading_options
+@simd_option
 @option(
     "--report",
     REPORT,
@@ -58,10 +56,10 @@ _FIT = group("Candidates", "--max-effects 1 --without magnet")
 def command(  # noqa: PLR0913 (an option each)
     *,
     path: Path,
-    model_path: Path | None,
+    model: Path | None,
     max_effects: int,
     without: tuple[str, ...],
-    effects_path: Path | None,
+    formulas: Path | None,
     rate_hz: float | None,
     **given: Any,  # noqa: ANN401 (outputs)
 ) -> None:
@@ -83,33 +81,31 @@ def command(  # noqa: PLR0913 (an option each)
     from pendmap.model.effects import definition
     from pendmap.records import files_of, read_experiment
 
-    own = [] if effects_path is None else load_formulas(effects_path)
-    with named(str(effects_path)):
-        checked_own(own)
+    effects = [] if formulas is None else load_formulas(formulas)
+    with named(str(formulas)):
+        checked_own(effects)
     with named("--without"):
-        own_names = {formula.name for formula in own}
-        for name in without:
-            if name not in own_names:
-                definition(name)
-    reads = [*files_of(path), model_path, effects_path]
+        for name in {*without} - {formula.name for formula in effects}:
+            definition(name)
+    reads = [*files_of(path), model, formulas]
     outputs = Outputs.take(given, "diagnose", ".toml", reads)
-    model = None if model_path is None else rig_from(model_path)
+    baseline = None if model is None else rig_from(model)
     with outputs.progress("read"):
         experiment = read_experiment(path, rate_hz=rate_hz)
     with outputs.progress("diagnose") as progress:
-        found = diagnose(
+        result = diagnose(
             experiment,
-            model=model,
+            model=baseline,
             max_effects=max_effects,
             without=without,
-            effects=own,
+            effects=effects,
             progress=progress,
         )
     with outputs.progress("write"):
         line = "pendmap " + shlex.join(sys.argv[1:])
-        save = functools.partial(save_model, diagnosed_model(found, line))
-        files = outputs.files(found, save)
+        save = functools.partial(save_model, diagnosed_model(result, line))
+        files = outputs.files(result, save)
         written = write_all(files, keep=True)
     more = {"model": written.name(outputs.out), "simd": instruction_set()}
-    lines = itertools.chain(as_text(found), ["", table(*ranking_table(found))])
-    outputs.finish(written, lambda: as_json(found) | more, lines)
+    lines = itertools.chain(as_text(result), ["", table(*ranking_table(result))])
+    outputs.finish(written, lambda: as_json(result) | more, lines)

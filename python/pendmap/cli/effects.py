@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.cli.parse.groups import PRINTED, argument, new_command
-from pendmap.cli.parse.options import flag, option, verbose_option
+from pendmap.cli.parse.groups import OUTPUT, argument, new_command
+from pendmap.cli.parse.options import flag, option
 from pendmap.cli.parse.types import EFFECT, FILE
 from pendmap.cli.text import say, write_json
 from pendmap.errors import escaped
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from pendmap.model.effects import EffectDefinition, EffectParameter
 
 _NAMES = 23  # Width of the column of names
+_MAPS = {"yes": "include it", "frozen": "evaluate it at lab_time", "no": "refuse it"}
 
 
 @new_command(
@@ -35,11 +36,10 @@ _NAMES = 23  # Width of the column of names
     "--effects path",
     FILE,
     "Show those of a file instead, its [[formula]]; they are checked.",
-    metavar="FILE",
-    group=PRINTED,
+    group=OUTPUT,
 )
-@verbose_option("Also parameters and which data reveal each.", PRINTED)
-@flag("--json as_json", "One JSON object on stdout.", group=PRINTED)
+@flag("--verbose", "Also parameters and which data reveal each.", group=OUTPUT)
+@flag("--json as_json", "One JSON object on stdout.", group=OUTPUT)
 def command(*, names: tuple[str, ...], path: Path | None, verbose: bool, as_json: bool) -> None:
     """Show the library of effects: formula, parameters, which data reveal each.
 
@@ -59,36 +59,23 @@ def command(*, names: tuple[str, ...], path: Path | None, verbose: bool, as_json
     if as_json:
         write_json({"effects": [dataclasses.asdict(effect) for effect in shown]})
         return
-    whole = verbose or bool(wanted)
     for group, members in itertools.groupby(shown, lambda effect: effect.group):
         say(click.style(group, bold=True))
         for effect in members:
-            _write(effect, whole=whole)
+            say(f"  {effect.name:<{_NAMES}} {effect.formula}")
+            if verbose or wanted:
+                for parameter in effect.parameters:
+                    say(f"      {_parameter(parameter)}")
+                maps = "ignore it" if group == "reading" else _MAPS[effect.mappable]
+                say(f"      maps {maps}; revealed by {effect.revealed_by}")
     if wanted:
         say("\nIn a model file without dimensions, which simulate and basins take by --model:")
         for effect in shown:
-            said = [known[effect.name].table] if effect.name in known else []
-            tables = {"formula": said, "effect": [_example(effect)]}
-            click.echo(escaped(f"\n{toml_text({k: v for k, v in tables.items() if v})}".rstrip()))
-    elif not whole:
+            formula = {"formula": [known[effect.name].table]} if effect.name in known else {}
+            text = toml_text(formula | {"effect": [_example(effect)]})
+            click.echo(escaped(f"\n{text}".rstrip()))
+    elif not verbose:
         say("\nAll about one: pendmap effects NAME; about all: pendmap effects --verbose")
-
-
-def _write(effect: EffectDefinition, *, whole: bool) -> None:
-    say(f"  {effect.name:<{_NAMES}} {effect.formula}")
-    if whole:
-        for parameter in effect.parameters:
-            say(f"      {_parameter(parameter)}")
-        say(f"      maps {_maps(effect)}; revealed by {effect.revealed_by}")
-
-
-def _maps(effect: EffectDefinition) -> str:
-    """Return how maps treat an effect, as the predicate of a sentence."""
-    if effect.group == "reading":
-        return "ignore it"
-    return {"frozen": "evaluate it at lab_time", "no": "refuse it"}.get(
-        effect.mappable, "include it"
-    )
 
 
 def _parameter(parameter: EffectParameter) -> str:

@@ -8,13 +8,8 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from pendmap.cli.parse.groups import OUTPUT, argument, group, new_command
-from pendmap.cli.parse.options import (
-    RESULTS,
-    option,
-    output_options,
-    reading_options,
-    verbose_option,
-)
+from pendmap.cli.parse.options import RESULTS, flag, output_options, simd_option
+from pendmap.cli.parse.signature import options_of
 from pendmap.cli.parse.types import EFFECT, METHOD
 from pendmap.cli.show import Outputs, Written, write_all
 from pendmap.cli.text import first_of_all
@@ -25,7 +20,6 @@ if TYPE_CHECKING:
 
 
 SUFFIX = ".toml"
-_FIT = group("Fit", "--effect quadratic_drag")
 
 
 @new_command(
@@ -35,23 +29,16 @@ _FIT = group("Fit", "--effect quadratic_drag")
     "pendmap identify decay --verbose",
 )
 @argument("path", "EXPERIMENT")
-@option(
-    "--method methods",
-    METHOD,
-    "Only this method; may be repeated.",
-    multiple=True,
-    group=_FIT,
+@options_of(
+    "identification.experiment.identify",
+    "method=methods effect=effects rate=rate_hz",
+    group("Fit", "--effect quadratic_drag"),
+    methods=METHOD,
+    effects=EFFECT,
 )
-@option(
-    "--effect effects",
-    EFFECT,
-    "Fit this effect of the library too; may be repeated.",
-    multiple=True,
-    group=_FIT,
-)
-@reading_options
+@simd_option
 @output_options((SUFFIX, RESULTS[0]))
-@verbose_option("Also the tables of all methods, intervals, and what was noticed.", OUTPUT)
+@flag("--verbose", "Also the tables of all methods, intervals, and what was noticed.", group=OUTPUT)
 def command(
     *,
     path: Path,

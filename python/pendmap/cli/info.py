@@ -9,38 +9,26 @@ import platform
 
 import click
 
-from pendmap.cli.parse.groups import PRINTED, new_command
+from pendmap.cli.parse.groups import OUTPUT, new_command
 from pendmap.cli.parse.options import flag
 
-_DEPENDENCIES = (
-    "numpy",
-    "scipy",
-    "xarray",
-    "pandas",
-    "netcdf4",
-    "matplotlib",
-    "rerun-sdk",
-    "click",
-    "cloup",
-    "tqdm",
-)
+_DEPENDENCIES = "numpy scipy xarray pandas netcdf4 matplotlib rerun-sdk click cloup tqdm"
 
 
 @new_command("info", "pendmap info --json")
-@flag("--json as_json", "One JSON object on stdout.", group=PRINTED)
+@flag("--json as_json", "One JSON object on stdout.", group=OUTPUT)
 def command(*, as_json: bool) -> None:
     """Show the version, the instruction set used, the threads."""
     from pendmap import _core
     from pendmap.errors import instruction_set
 
-    simd = instruction_set()
-    versions: dict[str, str | None] = dict.fromkeys(_DEPENDENCIES)
-    for name in _DEPENDENCIES:
+    versions: dict[str, str | None] = dict.fromkeys(_DEPENDENCIES.split())
+    for name in versions:
         with contextlib.suppress(importlib.metadata.PackageNotFoundError):
             versions[name] = importlib.metadata.version(name)
     facts = {
         "version": _core.__version__,
-        "simd": simd,
+        "simd": instruction_set(),
         "simd_available": _core.simd_available(),
         "threads": _core.default_threads(),
         "python": platform.python_version(),
@@ -49,10 +37,12 @@ def command(*, as_json: bool) -> None:
     if as_json:
         click.echo(json.dumps(facts))
         return
-    click.echo(f"pendmap {facts['version']}")
     available = ", ".join(_core.simd_available())
-    click.echo(f"instruction set  {simd} (here: {available}; --simd selects one)")
-    click.echo(f"threads          {facts['threads']}")
-    click.echo(f"Python           {facts['python']}")
-    for name, version in versions.items():
-        click.echo(f"{name:<17}{version or 'not installed'}")
+    rows = {
+        "instruction set": f"{facts['simd']} (here: {available}; --simd selects one)",
+        "threads": facts["threads"],
+        "Python": facts["python"],
+    }
+    click.echo(f"pendmap {facts['version']}")
+    for name, value in (rows | versions).items():
+        click.echo(f"{name:<17}{value or 'not installed'}")

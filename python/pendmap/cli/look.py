@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from pendmap.cli.parse.groups import argument, new_command
-from pendmap.cli.parse.options import output_options, rate_option
+from pendmap.cli.parse.options import output_options
+from pendmap.cli.parse.signature import options_of
 from pendmap.cli.show import Outputs, write_all
 
 if TYPE_CHECKING:
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
 
 @new_command("look", "pendmap look run.csv", "pendmap look runs --out records.png")
 @argument("path", "FILE|FOLDER")
-@rate_option
+@options_of("records.read.read_experiment", "rate=rate_hz")
 @output_options((), recording=False, json="")
 def command(*, path: Path, rate_hz: float | None, **given: Any) -> None:  # noqa: ANN401 (outputs)
     """Describe the contents and faults of a record, before anything is fitted.

@@ -6,22 +6,16 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from pendmap.cli.analysis import analysis_command
-from pendmap.cli.parse.groups import group
 from pendmap.cli.parse.model_options import varied_model_options
-from pendmap.cli.parse.options import draws_option, flag, search_options
 
 if TYPE_CHECKING:
     from pendmap.cli.show import Outputs
 
 
-_ANALYSIS = group("Analysis", "--curves")
-
-
 @analysis_command(
     "map",
-    flag("--curves", "Draw the critical curves of rest over it (p and omega).", group=_ANALYSIS),
-    draws_option(_ANALYSIS),
-    search_options,
+    "curves draws starts tol max_periods seed",
+    example="--curves",
     examples=(
         "pendmap map --p 0.05:2.5:50 --omega 0.5:3:50 --curves",
         "pendmap map --vary gamma 0.02:0.4:20 --p 0.2:2:20 --json",

@@ -8,15 +8,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from pendmap.cli.parse.groups import PRINTED, argument, new_command
-from pendmap.cli.parse.options import (
-    option,
-    overwrite_option,
-    printed_options,
-    seed_option,
-    simd_option,
-)
-from pendmap.cli.parse.types import PICTURES, default_file, output_file
+from pendmap.cli.parse.groups import OUTPUT, argument, new_command
+from pendmap.cli.parse.options import option, overwrite_option, printed_options, simd_option
+from pendmap.cli.parse.signature import options_of
+from pendmap.cli.parse.types import FOLDER, PICTURES, default_file, output_file
 from pendmap.cli.show import free_name, keep_files, write_all
 from pendmap.cli.text import say, table, write_json
 
@@ -28,23 +23,22 @@ _LONG = "8"  # Figure that takes 100 s of a processor (AMD EPYC, family 26)
 
 @new_command("paper", "pendmap paper 2", "pendmap paper table1", "pendmap paper all --out figures")
 @argument("figure", "FIGURE", str, nargs=-1, required=True)
-@seed_option("Of the rig's noise.")
+@options_of("paper.figures.draw", "seed")
 @simd_option
 @option(
     "--out",
-    click.Path(path_type=Path, file_okay=False),
+    FOLDER,
     "Folder for the files, made if it is not there.  [default: the current one]",
-    metavar="DIR",
-    group=PRINTED,
+    group=OUTPUT,
 )
 @option(
     "--plot",
     output_file(*PICTURES),
     "File of one figure: .png .svg .pdf; for table1 a picture and a .csv.",
-    group=PRINTED,
+    group=OUTPUT,
 )
-@overwrite_option(PRINTED)
-@printed_options(PRINTED)
+@overwrite_option
+@printed_options()
 def command(  # noqa: PLR0913 (an option each)
     *,
     figure: tuple[str, ...],
@@ -83,9 +77,9 @@ def command(  # noqa: PLR0913 (an option each)
         if any(Path(name).suffix == ".csv" for name in written):
             from pendmap.identification.report import methods_table, table1_table
 
-            found = figures.report(seed)
-            for each in (methods_table(found), table1_table(found), figures.printed_table()):
-                say(table(*each))
+            report = figures.report(seed)
+            for rows in (methods_table(report), table1_table(report), figures.printed_table()):
+                say(table(*rows))
         written.say()
     written.check()
 

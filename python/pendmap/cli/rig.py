@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.cli.parse.groups import PRINTED, argument, group, new_command
-from pendmap.cli.parse.options import flag, option, printed_options
-from pendmap.cli.parse.types import EFFECT, FILE, NUMBER, PICTURES, output_file
+from pendmap.cli.parse.groups import OUTPUT, argument, group, new_command
+from pendmap.cli.parse.options import flag, option, overwrite_option, printed_options
+from pendmap.cli.parse.signature import options_of
+from pendmap.cli.parse.types import EFFECT, FOLDER, PICTURES, output_file
 from pendmap.cli.show import keep_files, write_all
 from pendmap.cli.text import say, write_json
 from pendmap.formatting import counted
@@ -18,13 +19,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from pendmap import virtual_rig
 
-
-_RUNS = group("Runs", "--free 3 --forced 2 --duration 40")
+_REQUEST = "virtual_rig.experiment.Request"
 _HIDDEN = group("Hidden effects", "--effect quadratic_drag --seed 3")
-_RIG = group("Rig", "--w0 6.2 --c-over-m 0.05 --tr 0.08")
-_SENSOR = group("Sensor", "--noise 0.2 --counts 1024")
 
 
 @new_command(
@@ -33,62 +30,23 @@ _SENSOR = group("Sensor", "--noise 0.2 --counts 1024")
     "pendmap rig hidden --effect quadratic_drag --seed 3 --out hidden",
 )
 @argument("name", "[free_decay|forced|hidden]", str, required=False)
-@option("--free", int, "Free decays.  [default: 1; forced: 0; hidden: 5]", group=_RUNS)
-@option("--forced", int, "Runs under drive.  [default: 0; forced and hidden: 4]", group=_RUNS)
-@option(
-    "--duration",
-    NUMBER,
-    "Of each run, s.  [default: until rest; forced: 30 to 40; hidden: 15 to 30]",
-    group=_RUNS,
+@options_of(
+    _REQUEST, "free forced duration seed", group("Runs", "--free 3 --forced 2 --duration 40")
 )
-@option("--seed", click.IntRange(min=0), "Draws all.", 0, group=_RUNS)
-@option(
-    "--effect effects",
-    EFFECT,
-    "Effect to hide, more than once for several: a name of --list, also with its parameters"
-    " (magnet:dipole,amplitude=0.1,d=0.2), any (the seed chooses) or none.  [default: hidden: any]",
-    multiple=True,
-    group=_HIDDEN,
-)
-@option("--size", NUMBER, "Scales drawn effects.", 1.0, group=_HIDDEN)
-@option(
-    "--mess",
-    NUMBER,
-    "Weak disturbances in addition to the effects (texture of the bearing, drifting zero, slow "
-    "noise), in multiples of the noise.",
-    0.0,
-    group=_HIDDEN,
-)
+@options_of(_REQUEST, "effect=effects size mess", _HIDDEN, effects=EFFECT)
 @flag("--list listing", "List the effects and stop.", group=_HIDDEN)
-@option("--w0", NUMBER, "Natural frequency, rad/s.  [default: 6.0 to 6.4]", group=_RIG)
-@option(
-    "--c-over-m",
-    NUMBER,
-    "Viscous damping, 1/s.  [default: about 0.05; 0.05 to 0.1]",
-    group=_RIG,
+@options_of(
+    _REQUEST, "w0 c_over_m tr=friction theta_r", group("Rig", "--w0 6.2 --c-over-m 0.05 --tr 0.08")
 )
-@option(
-    "--tr friction",
-    NUMBER,
-    "Coulomb friction Tr, rad/s^2.  [default: about 0.08; 0.05 to 0.1]",
-    group=_RIG,
+@options_of(
+    _REQUEST,
+    "noise correlation counts rate jitter dropouts outliers",
+    group("Sensor", "--noise 0.2 --counts 1024"),
 )
-@option("--theta-r", NUMBER, "The same without dimensions: Tr/w0^2.", group=_RIG)
-@option("--noise", NUMBER, "Degrees.  [default: 0.1; hidden: 0.05 to 0.5]", group=_SENSOR)
-@option("--correlation", NUMBER, "AR(1) of the noise.", 0.0, group=_SENSOR)
-@option("--counts", int, "A turn; 0: no steps.", 4096, group=_SENSOR)
-@option("--rate", NUMBER, "Samples a second, Hz.", 100.0, group=_SENSOR)
-@option("--jitter", NUMBER, "Of the clock, s rms.", 0.0, group=_SENSOR)
-@option("--dropouts", NUMBER, "Share of samples lost.", 0.0, group=_SENSOR)
-@option("--outliers", NUMBER, "Share that is false.", 0.0, group=_SENSOR)
-@option("--out", FILE, "Folder to write.", metavar="DIR", group=PRINTED)
-@option("--plot", output_file(*PICTURES), "Figure of the records: .png .svg .pdf.", group=PRINTED)
-@flag(
-    "--overwrite --replace overwrite",
-    "Replace an experiment or a figure that is there.",
-    group=PRINTED,
-)
-@printed_options(PRINTED)
+@option("--out", FOLDER, "Folder to write.", group=OUTPUT)
+@option("--plot", output_file(*PICTURES), "Figure of the records: .png .svg .pdf.", group=OUTPUT)
+@overwrite_option
+@printed_options()
 def command(  # noqa: PLR0913 (an option each)
     *,
     name: str | None,
@@ -111,9 +69,10 @@ def command(  # noqa: PLR0913 (an option each)
     if listing:
         _list(virtual_rig.describe(), as_json=as_json)
         return
-    request = _request(name, given)
-    if out is None:
-        raise click.UsageError("--out DIR is missing")
+    if name is None or out is None:
+        lacking = "NAME (free_decay, forced or hidden)" if name is None else "--out DIR"
+        raise click.UsageError(f"{lacking} is missing")
+    request = virtual_rig.Request(name, **given)
     where = virtual_rig.places(out, replace=overwrite)
     if plot is not None and not overwrite:
         keep_files({plot: "--plot"})
@@ -126,53 +85,29 @@ def command(  # noqa: PLR0913 (an option each)
 
     files: list[tuple[Callable[[Path], Path | str], Path]] = [(write, where.experiment)]
     if plot is not None:
-        files.append((functools.partial(_draw, experiment, where.experiment.name), plot))
+        files.append((functools.partial(_draw, where.experiment), plot))
     written = write_all(files)
-    whole, drawn = both in written, written.name(plot)
+    whole = both in written
     if as_json:
         places = {"experiment": where.experiment, "truth": where.truth} if whole else {}
-        named = {name: str(path) for name, path in places.items()}
-        write_json(named | ({"plot": drawn} if drawn else {}))
-    elif not quiet:
-        if whole:
-            seconds = sum(run.plan.duration for run in experiment.runs)
-            runs = counted(len(experiment.runs), "run")
-            say(f"Written: {where.experiment} ({runs}, {seconds:.0f} s)")
-            say(f"The truth: {where.truth}")
-        if drawn:
+        places |= {"plot": plot} if plot is not None and written.name(plot) else {}
+        write_json({name: str(path) for name, path in places.items()})
+    elif whole and not quiet:
+        seconds = sum(run.plan.duration for run in experiment.runs)
+        runs = counted(len(experiment.runs), "run")
+        say(f"Written: {where.experiment} ({runs}, {seconds:.0f} s)")
+        say(f"The truth: {where.truth}")
+        if drawn := written.name(plot):
             say(f"The records: {drawn}")
     written.check()
 
 
-def _draw(experiment: virtual_rig.Experiment, name: str, path: Path) -> Path:
-    """Draw the records with their public description, without hidden values."""
-    from pendmap import virtual_rig
-    from pendmap.charts.runs import RunPanel, of_runs
+def _draw(folder: Path, path: Path) -> Path:
+    """Draw the records as ``look`` does, from their files: without hidden values."""
+    from pendmap.records import read_experiment
     from pendmap.render import draw
 
-    held = virtual_rig.held_out(experiment)
-    records = []
-    for k, run in enumerate(experiment.runs):
-        plan = run.plan
-        words = [f"run_{k:02d}: {plan.kind}"]
-        if plan.kind == "forced":
-            omega = "\N{GREEK CAPITAL LETTER OMEGA}"
-            words += [f"p = {plan.p:g}", f"{omega} = {plan.frequency:g} rad/s"]
-        words += ["held out"] if k in held else []
-        records.append(RunPanel(", ".join(words), run.time, run.angle))
-    sensor = experiment.sensor
-    counts = f", {sensor.counts} counts a turn" if sensor.counts else ""
-    subtitle = f"virtual rig, {counted(len(records), 'run')}; {sensor.rate:g} Hz{counts}"
-    title = f"Measured angle: {name}"
-    return draw(of_runs(records, title=title, subtitle=subtitle), path)
-
-
-def _request(name: str | None, given: dict[str, Any]) -> virtual_rig.Request:
-    from pendmap import virtual_rig
-
-    if name is None:
-        raise click.UsageError("NAME (free_decay, forced or hidden) is missing")
-    return virtual_rig.Request(name, **given)
+    return draw(read_experiment(folder), path)
 
 
 def _list(effects: list[dict[str, str]], *, as_json: bool) -> None:

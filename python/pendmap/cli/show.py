@@ -11,7 +11,7 @@ import itertools
 import shlex
 import sys
 import time
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any, Final
 
 import click
@@ -40,39 +40,30 @@ _SOON: Final = (3.0, 1e-4)  # Time, s, and share of the work from which on both 
 _LONGER: Final = 2.0  # Ratio of a new time to the one told that is worth another line
 
 
-class Forecast:
-    """Time that is left, from the pace of a command since its present part began.
+def forecast(say: Callable[[str], object]) -> Callable[[int, int], None]:
+    """Return a callback of progress that says how long work of more than a minute takes.
 
-    A part of a computation begins where the work done falls, or where its total changes.
+    A part of a computation begins where the work done falls, or where its total changes. The time
+    is said again where a later part makes it much longer.
     """
+    began = since = time.monotonic()
+    last, first, most, longest = 0, 0, 0, 0.0
 
-    def __init__(
-        self, say: Callable[[str], object], clock: Callable[[], float] = time.monotonic
-    ) -> None:
-        self._say, self._clock = say, clock
-        self._began = self._since = clock()
-        self._total, self._first, self._done = 0, 0, 0
-        self._whole = 0.0
-
-    def report(self, done: int, total: int) -> None:
-        """Take units of work done and in total; tell the time if it is more than a minute.
-
-        It is told again where a later part of the computation makes it much longer.
-        """
-        now = self._clock()
-        if total != self._total or done < self._done:
-            self._since, self._total, self._first = now, total, done
-        self._done = done
-        if total <= 0:
+    def report(done: int, total: int) -> None:
+        nonlocal since, last, first, most, longest
+        now = time.monotonic()
+        if total != most or done < last:
+            since, most, first = now, total, done
+        last = done
+        if now - since < _SOON[0] or done - first < max(_SOON[1] * total, 1):
             return
-        passed, share = now - self._since, (done - self._first) / total
-        if passed < _SOON[0] or share < _SOON[1]:
-            return
-        left = passed * (total - done) / (done - self._first)
-        whole = now - self._began + left
-        if left > _LONG and whole > _LONGER * self._whole:
-            self._whole = whole
-            self._say(f"This takes about {duration(whole)}.")
+        left = (now - since) * (total - done) / (done - first)
+        whole = now - began + left
+        if left > _LONG and whole > _LONGER * longest:
+            longest = whole
+            say(f"This takes about {duration(whole)}.")
+
+    return report
 
 
 _FIELDS: Final = {
@@ -81,19 +72,17 @@ _FIELDS: Final = {
     ".rrd": "rerun",
 }
 """What a file of ``--out`` is, by its suffix; other files are the result itself."""
-_SAME: Final = {"out": ["out", "address"], "address": ["out", "address"]}
 
 
 @dataclasses.dataclass(frozen=True)
 class Outputs:
     """Output files and options of a command."""
 
-    out: Path | None = None
+    out: Path | Address | None = None
     whole: Path | None = None  # the whole result, where `out` is a model
     plot: Path | None = None
     report: Path | None = None
     rerun: Path | None = None
-    address: Address | None = None
     view: bool = False
     as_json: bool = False
     quiet: bool = False
@@ -122,12 +111,11 @@ class Outputs:
         options = {taken[f]: f"--{f}" for f in ("plot", "report", "rerun") if taken.get(f)}
         known = _FIELDS if suffix in RESULTS else {**_FIELDS, RESULTS[0]: "whole"}
         for path in named_files:
-            field = (
-                "address" if isinstance(path, Address) else known.get(path.suffix.lower(), "out")
-            )
-            other = next((taken[f] for f in _SAME.get(field, [field]) if taken.get(f)), None)
-            if other is not None:
-                raise click.UsageError(f"one of {other} and {path} must be left out, got both")
+            field = known.get(PurePath(path).suffix.lower(), "out")
+            if taken.get(field) is not None:
+                raise click.UsageError(
+                    f"one of {taken[field]} and {path} must be left out, got both"
+                )
             taken[field] = path
             options[path] = "--out"
         files = {"out": suffix, "plot": ".png", "report": ".html", "rerun": ".rrd"}
@@ -158,24 +146,20 @@ class Outputs:
     def check_room(self, cells: int) -> None:
         """Refuse a map if the disk lacks half a byte a cell, the least compressed size."""
         for path in (self.out, self.rerun):
-            if path is not None:
+            if isinstance(path, Path):
                 check_room(path, cells // 2)
 
     @property
     def draws(self) -> bool:
         """Whether a file, a figure or a recording is written."""
-        return bool(self.out or self.address or self.drawings)
-
-    @property
-    def drawings(self) -> bool:
-        """Whether a figure or a recording is written."""
-        return bool(self.plot or self.rerun or self.view)
+        return bool(self.out or self.plot or self.rerun or self.view)
 
     @property
     def store(self) -> Path | Address | None:
         """The Zarr store that --out names."""
-        zarr = self.out is not None and self.out.suffix.lower() == ".zarr"
-        return self.address or (self.out if zarr else None)
+        out = self.out
+        zarr = isinstance(out, Address) or (out is not None and out.suffix.lower() == ".zarr")
+        return out if zarr else None
 
     @property
     def shows_progress(self) -> bool:
@@ -192,15 +176,15 @@ class Outputs:
             yield None
             return
         if not sys.stderr.isatty():
-            yield Forecast(functools.partial(click.echo, err=True)).report
+            yield forecast(functools.partial(click.echo, err=True))
             return
         from pendmap.engine.bar import ProgressBar
 
         with ProgressBar(name, leave=False) as bar:
-            forecast = Forecast(bar.write)
+            announce = forecast(bar.write)
 
             def report(done: int, total: int) -> None:
-                forecast.report(done, total)
+                announce(done, total)
                 bar(done, total)
 
             yield report
@@ -215,7 +199,7 @@ class Outputs:
 
         ``look`` has arguments of the figure.
         """
-        if self.out is not None and save is not None:
+        if isinstance(self.out, Path) and save is not None:
             yield save, self.out
         if self.whole is not None:
             yield result.save, self.whole
@@ -305,7 +289,7 @@ def keep_inputs(
 
     read = [path for path in inputs if path is not None and path.exists()]
     for named_file in (outputs.out, outputs.whole, outputs.plot, outputs.rerun, outputs.report):
-        if named_file is None:
+        if not isinstance(named_file, Path):
             continue
         files = _report_files(named_file) if named_file is outputs.report else [named_file]
         for output in files:
@@ -345,7 +329,7 @@ class Written(list[str]):
         self.missed: list[str] = []
         self.refused: list[InputError] = []
 
-    def name(self, path: Path | None) -> str | None:
+    def name(self, path: Path | Address | None) -> str | None:
         """Return the name of a file if it is complete, else None."""
         return str(path) if str(path) in self else None
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from pendmap.cli.parse.groups import ACCURACY, OUTPUT, group, new_command
+from pendmap.cli.parse.groups import OUTPUT, group, new_command
 from pendmap.cli.parse.model_options import model_options
-from pendmap.cli.parse.options import flag, option, output_options, simd_option, start_options
-from pendmap.cli.parse.types import NUMBER, whole
+from pendmap.cli.parse.options import option, output_options, simd_option
+from pendmap.cli.parse.signature import options_of
+from pendmap.cli.parse.types import NUMBER
 from pendmap.cli.show import begin, show
-from pendmap.errors import MOST_SAMPLES, named
+from pendmap.errors import named
 
 _ANALYSIS = group("Trajectory", "--until 500 --samples 128")
 _VIEWER = "127.0.0.1:9876"
@@ -22,13 +23,9 @@ _VIEWER = "127.0.0.1:9876"
     "pendmap simulate --preset fig2c --theta 1 --until 600 --out chaos.png",
 )
 @model_options
-@start_options
+@options_of("analysis.lyapunov.lyapunov", "theta velocity")
 @option("--until", NUMBER, "Last time, in 1/w0, in SI s.", 100.0, group=_ANALYSIS)
-@option("--tol", NUMBER, "Error after 5 periods.", 1e-9, group=ACCURACY)
-@option(
-    "--samples", whole(1, MOST_SAMPLES), "Samples a period.  [default: 64 or more]", group=_ANALYSIS
-)
-@flag("--lyapunov", "Also the Lyapunov exponent of this stretch.", group=_ANALYSIS)
+@options_of("analysis.trajectory.simulate", "tol samples lyapunov", _ANALYSIS)
 @option(
     "--live",
     str,

@@ -5,19 +5,14 @@ from __future__ import annotations
 import functools
 from typing import TYPE_CHECKING, Any
 
-import click
-
 from pendmap.cli.analysis import analysis_command
 from pendmap.cli.parse.groups import group
 from pendmap.cli.parse.model_options import model_options
-from pendmap.cli.parse.options import draws_option, option, seed_option
-from pendmap.cli.parse.types import NUMBER, VALUES
+from pendmap.cli.parse.options import option
+from pendmap.cli.parse.types import VALUES
 
 if TYPE_CHECKING:
     from pendmap.cli.show import Outputs
-
-
-_ANALYSIS = group("Analysis", "--omega 0.5:3:200 --p-max 6")
 
 
 @analysis_command(
@@ -26,18 +21,10 @@ _ANALYSIS = group("Analysis", "--omega 0.5:3:200 --p-max 6")
         "--omega omegas",
         VALUES,
         "Frequencies Omega/w0 of the drive.  [default: 0.5:3:200]",
-        group=_ANALYSIS,
+        group=group("Frequencies", "--omega 0.5:3:200"),
     ),
-    option("--p-max", NUMBER, "Largest amplitude.", 6.0, group=_ANALYSIS),
-    option(
-        "--plane",
-        click.Choice(["omega-p", "e-alpha2"]),
-        "Plane drawn: of eq. 1.2, or of eq. 1.4 with e = p/omega^2, alpha^2 = 1/omega^2.",
-        "omega-p",
-        group=_ANALYSIS,
-    ),
-    draws_option(_ANALYSIS),
-    seed_option("Draws the models."),
+    "p_max plane draws seed",
+    example="--p-max 6 --plane e-alpha2",
     examples=(
         "pendmap tongues --omega 0.5:3:200 --p-max 6",
         "pendmap tongues --gamma 0 --plane e-alpha2 --out mathieu.pdf",

@@ -65,8 +65,8 @@ class Ensemble:
     members : int
         Number of initial states; 20 to 100,000.
     spread : float
-        Standard deviation about the measured initial state, rad for the angle and times the natural
-        frequency for the velocity, in addition to its standard error.
+        Their standard deviation about the measured initial state, rad, and over ``w0``; its
+        standard error is added.
     seed : int
         Seed of the random initial states.
 

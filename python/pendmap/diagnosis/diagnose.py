@@ -20,7 +20,7 @@ from pendmap.diagnosis.search import search
 from pendmap.diagnosis.state import State
 from pendmap.diagnosis.thresholds import Thresholds
 from pendmap.diagnosis.verdict import decide_verdict
-from pendmap.errors import FitDiverged, InputError
+from pendmap.errors import FitDiverged, InputError, check_whole
 from pendmap.identification.experiment import provenance
 from pendmap.identification.fit import refuse_astray
 from pendmap.records import experiment_of
@@ -60,9 +60,9 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
     records : path, DataFrame, Experiment, Run, or a sequence of these
         As for :func:`pendmap.identify`; forced runs too.
     model : Rig, optional
-        The baseline; by default viscous damping and Coulomb friction.
+        The baseline, in SI; by default viscous damping and Coulomb friction.
     max_effects : int
-        Most effects that are added; the sensor's zero is not included.
+        Most effects that are added, 0 to 6; the sensor's zero is not included.
     without : collection of str
         Effects excluded from the candidates.
     effects : sequence of Formula
@@ -103,6 +103,7 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
     """
     experiment = experiment_of(records, rate_hz=rate_hz)
     own = checked_own(effects)
+    check_whole("max_effects", max_effects, 0, 6)
     moved = in_rounds(progress, _FITS) or (lambda _done, _total: None)
     data = split_records(experiment)
     with _refuse_divergence(experiment):

@@ -90,11 +90,11 @@ def identify(  # noqa: PLR0913 (each is asked for by name)
     theta : array, shape (N,), optional
         Angles from the downward rest, rad, of one free decay.
     methods : iterable of str, optional
-        Names of :data:`pendmap.identification.METHODS`; by default all.
+        Methods to apply, of :data:`pendmap.identification.METHODS`; by default all.
     start : Rig, optional
         Starting values and effects of the trajectory method; by default estimated from the record.
     effects : sequence of Effect or str
-        Further effects, or their names, whose sizes the trajectory method fits.
+        Further effects, also by name, whose sizes the trajectory method fits.
     rate_hz : float, optional
         Sampling rate, Hz, of records without a column of times.
     progress : callable, optional

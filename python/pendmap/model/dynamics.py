@@ -34,6 +34,11 @@ class Dynamics(abc.ABC):
     def units(self) -> Units:
         """The units of arguments and results."""
 
+    @classmethod
+    def numbers(cls) -> tuple[str, ...]:
+        """Return the names of the parameters that are numbers."""
+        return tuple(name for name, kind in cls.__annotations__.items() if kind == "float")
+
     def acceleration(self, t: ArrayLike, theta: ArrayLike, v: ArrayLike) -> Floats:
         """Return ``th''``, with all effects and friction.
 

@@ -5,16 +5,16 @@ from __future__ import annotations
 import os
 import tomllib
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from pendmap.errors import InputError, check_type
-from pendmap.files import whole_file
+from pendmap.errors import InputError, check_type, named
+from pendmap.files import read_toml, whole_file
 from pendmap.model.pendulum import Pendulum, model_text
 from pendmap.model.rig import Rig
-from pendmap.model.tables import parsed_model, read_model
+from pendmap.model.tables import model_arguments
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Mapping
 
 
 def load_model(
@@ -58,8 +58,7 @@ def load_model(
     >>> pendmap.load_model(path).w0
     6.2
     """
-    makers: dict[str, Callable[..., Pendulum | Rig]] = {"bare": Pendulum, "si": Rig.of}
-    return read_model(path, typed, **makers)
+    return _model(read_toml(path), os.fspath(path), typed)
 
 
 def save_model(model: Pendulum | Rig, path: str | os.PathLike[str]) -> Path:
@@ -103,5 +102,12 @@ def save_model(model: Pendulum | Rig, path: str | os.PathLike[str]) -> Path:
 
 def parse_model(text: str, where: str, typed: Mapping[str, float] | None = None) -> Pendulum | Rig:
     """Return the model of :func:`model_text`, with ``typed`` values; ``where`` is for errors."""
-    bare: Callable[..., Pendulum | Rig] = Pendulum
-    return parsed_model(tomllib.loads(text), where, typed, bare=bare, si=Rig.of)
+    return _model(tomllib.loads(text), where, typed)
+
+
+def _model(
+    content: dict[str, Any], where: str, typed: Mapping[str, float] | None
+) -> Pendulum | Rig:
+    with named(where):
+        in_si, arguments = model_arguments(content, typed or {})
+        return Rig.of(**arguments) if in_si else Pendulum(**arguments)

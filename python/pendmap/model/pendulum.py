@@ -13,11 +13,10 @@ from pendmap.model.covariance import misses
 from pendmap.model.dynamics import Dynamics
 from pendmap.model.effects import Effect
 from pendmap.model.labels import LABELS, unit_of
-from pendmap.model.tables import EFFECT, FORMAT, check_notes, effects_in, read_model
+from pendmap.model.tables import EFFECT, FORMAT, check_notes, effects_in
 from pendmap.units import NONDIMENSIONAL, Units
 
 if TYPE_CHECKING:
-    import os
     from collections.abc import Mapping, Sequence
 
 
@@ -96,11 +95,6 @@ class Pendulum(Dynamics):
         if self.effects:
             _ = self.period  # the core refuses effects that occur twice or are outside their range
 
-    @classmethod
-    def numbers(cls) -> tuple[str, ...]:
-        """Return the names of the parameters that are numbers."""
-        return tuple(f.name for f in dataclasses.fields(cls) if f.type == "float")
-
     @property
     def units(self) -> Units:
         """The units of results."""
@@ -144,11 +138,6 @@ class Pendulum(Dynamics):
         driven = is_driven(self.p, self.effects)
         names = [name for name in self.numbers() if driven or name != "omega"]
         return title_of(self, names, {"gamma", "p"})
-
-    @classmethod
-    def from_toml(cls, path: str | os.PathLike[str]) -> Pendulum:
-        """Read a model file without dimensions, by :func:`pendmap.load_model`; refuse one in SI."""
-        return read_model(path, bare=cls)
 
 
 def checked_effects(effects: object, own: Mapping[str, tuple[str, float]]) -> tuple[Effect, ...]:

@@ -12,11 +12,10 @@ from pendmap.model.dynamics import Dynamics
 from pendmap.model.effects import library
 from pendmap.model.pendulum import Pendulum, attributes_of, checked_effects, title_of
 from pendmap.model.quantities import COUNTERPARTS
-from pendmap.model.tables import SI_KEYS, read_model
+from pendmap.model.tables import SI_KEYS
 from pendmap.units import Units
 
 if TYPE_CHECKING:
-    import os
     from collections.abc import Mapping
 
     from pendmap.model.effects import Effect
@@ -122,11 +121,6 @@ class Rig(Dynamics):
             ) from None
 
     @classmethod
-    def numbers(cls) -> tuple[str, ...]:
-        """Return the names of the parameters that are numbers."""
-        return tuple(f.name for f in dataclasses.fields(cls) if f.type == "float")
-
-    @classmethod
     def of(
         cls,
         *,
@@ -163,9 +157,7 @@ class Rig(Dynamics):
         return cls(**numbers, effects=effects, notes=notes or {}, given_stroke=stroke)
 
     @classmethod
-    def from_pendulum(
-        cls, pendulum: Pendulum, w0: float, *, gravity: float = quantities.GRAVITY
-    ) -> Rig:
+    def from_pendulum(cls, pendulum: Pendulum, w0: float) -> Rig:
         """Return a pendulum without dimensions in SI, ``w0`` in rad/s; its covariance is dropped.
 
         Examples
@@ -180,8 +172,7 @@ class Rig(Dynamics):
             for bare, (si, power) in COUNTERPARTS.items()
         }
         effects = tuple(effect.given(units) for effect in pendulum.effects)
-        notes = _kept(pendulum.notes)
-        return cls(w0=units.w0, gravity=gravity, effects=effects, notes=notes, **numbers)
+        return cls(w0=units.w0, effects=effects, notes=_kept(pendulum.notes), **numbers)
 
     @property
     def units(self) -> Units:
@@ -233,11 +224,6 @@ class Rig(Dynamics):
         """The parameters in one line, without zeros unless effects depend on them."""
         names = ("w0", "c_over_m", "p", "Omega", "phi", "torque", "Tr", "lab_time_s")
         return title_of(self, names, {"w0", "c_over_m", "p"})
-
-    @classmethod
-    def from_toml(cls, path: str | os.PathLike[str]) -> Rig:
-        """Read a model file in SI, by :func:`pendmap.load_model`; refuse one without dimensions."""
-        return read_model(path, si=cls.of)
 
 
 def without_dimensions(model: Pendulum | Rig) -> tuple[Pendulum, Units]:

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import difflib
-import os
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import Any, Final
 
 from pendmap.errors import (
     InputError,
     check_keys,
     check_number,
     check_whole,
-    named,
     short_repr,
     shown_key,
 )
-from pendmap.files import read_toml
 from pendmap.model import quantities
 from pendmap.model.covariance import without
 from pendmap.model.effects import Effect
@@ -24,9 +21,6 @@ from pendmap.model.formula import each_table, formulas_of
 from pendmap.model.labels import LABELS
 from pendmap.model.quantities import COUNTERPARTS
 from pendmap.units import Units
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 FORMAT: Final = 1  # Version of the layout of model files, in their key ``format_version``
 TOP: Final = ("pendulum", "formula", "effect", "covariance", "provenance", "format_version")
@@ -39,49 +33,22 @@ SI_KEYS: Final = (*(n for ways in quantities.GROUPS.values() for n in ways), *qu
 BARE_KEYS: Final = (*COUNTERPARTS, "zeta")
 _ONLY_SI: Final = tuple(name for name in SI_KEYS if name not in BARE_KEYS)
 _ONLY_BARE: Final = tuple(name for name in BARE_KEYS if name not in SI_KEYS)
-_IN_SI: Final = "is in SI: Rig.from_toml reads it, and its property pendulum has no dimensions"
-_BARE: Final = (
-    "has no dimensions: Pendulum.from_toml reads it, and Rig.from_pendulum puts it in SI with its "
-    "w0"
-)
-_Model = TypeVar("_Model")
 
 
-def read_model(
-    path: str | os.PathLike[str],
-    typed: Mapping[str, float] | None = None,
-    *,
-    bare: Callable[..., _Model] | None = None,
-    si: Callable[..., _Model] | None = None,
-) -> _Model:
-    """Return the model of a file, made by ``bare`` or ``si``; refuse it if its maker is None."""
-    return parsed_model(read_toml(path), os.fspath(path), typed, bare=bare, si=si)
-
-
-def parsed_model(
-    content: dict[str, Any],
-    where: str,
-    typed: Mapping[str, float] | None = None,
-    *,
-    bare: Callable[..., _Model] | None = None,
-    si: Callable[..., _Model] | None = None,
-) -> _Model:
-    """Return the model of a parsed file, as :func:`read_model`; ``where`` names it in errors."""
-    typed = dict(typed or {})
-    with named(where):
-        _check_top(content)
-        table = content.get("pendulum")
-        if not isinstance(table, dict):
-            raise InputError("has no table [pendulum]")
-        effects = effects_in(content)
-        notes: dict[str, Any] = {name: content[name] for name in NOTES if name in content}
-        in_si = _is_si(table)
-        numbers = _typed_over(table, typed) if in_si else _bare_numbers(table, typed, effects)
-        exact = [_own_name(name) for name in typed] if in_si else typed
-        make = si if in_si else bare
-        if make is None:
-            raise InputError(_IN_SI if in_si else _BARE)
-        return make(**numbers, effects=effects, notes=without(notes, exact))
+def model_arguments(
+    content: dict[str, Any], typed: Mapping[str, float]
+) -> tuple[bool, dict[str, Any]]:
+    """Return whether a parsed file is in SI, and the arguments of its model, ``typed`` over it."""
+    _check_top(content)
+    table = content.get("pendulum")
+    if not isinstance(table, dict):
+        raise InputError("has no table [pendulum]")
+    effects = effects_in(content)
+    in_si = _is_si(table)
+    numbers = _typed_over(table, typed) if in_si else _bare_numbers(table, typed, effects)
+    exact = [_own_name(name) if in_si else name for name in typed]
+    notes = without({name: content[name] for name in NOTES if name in content}, exact)
+    return in_si, {**numbers, "effects": effects, "notes": notes}
 
 
 def _check_top(content: dict[str, Any]) -> None:

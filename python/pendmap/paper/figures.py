@@ -93,7 +93,13 @@ def tumbling(periods: int = 6000) -> list[xr.Dataset]:
 
 
 def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
-    """Draw a figure, or the table, into a .png, .svg or .pdf; ``seed`` is that of the noise."""
+    """Draw a figure, or the table, into a .png, .svg or .pdf.
+
+    Parameters
+    ----------
+    seed : int
+        Draws the rig's noise.
+    """
     from pendmap import render  # noqa: PLC0415
     from pendmap.charts import comparison, identification, tongues  # noqa: PLC0415
     from pendmap.model import PRESETS  # noqa: PLC0415

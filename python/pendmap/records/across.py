@@ -14,15 +14,15 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.formatting import counted
-from pendmap.records.experiment import Finding
-from pendmap.records.scale import small_period
+from pendmap.records.findings import finding_of
+from pendmap.records.periods import small_period
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from pendmap.records.experiment import Run
+    from pendmap.records.experiment import Finding, Run
     from pendmap.signal import Floats
 
 
@@ -38,7 +38,8 @@ MOST_THINNED: Final = 10  # Greatest decimation factor of a duplicate that is se
 
 def checked_together(runs: Sequence[Run]) -> tuple[tuple[Run, ...], tuple[Finding, ...]]:
     """Return runs without duplicated readings, and the findings across runs."""
-    made, found = without_duplicates(runs), list[Finding]()
+    made = without_duplicates(runs)
+    findings: list[Finding] = []
     swings = {
         run.name: small_period(run.time[run.trusted], run.theta[run.trusted], run.count_rad)
         for run in made
@@ -47,11 +48,10 @@ def checked_together(runs: Sequence[Run]) -> tuple[tuple[Run, ...], tuple[Findin
     known = sorted((period, name) for name, period in swings.items() if math.isfinite(period))
     if known and known[-1][0] > (1 + ONE_RIG) * known[0][0]:
         short, long = (f"{period:.4g} s in {name}" for period, name in (known[0], known[-1]))
-        text = f"small swings take {short} and {long}: these are not runs of one pendulum"
-        found.append(Finding("rigs-differ", text))
+        findings.append(finding_of("rigs-differ", short=short, long=long))
     if runs and all(run.hold_out for run in runs):
-        found.append(Finding("all-held-out", "all runs are held out: none is left to fit"))
-    return tuple(made), tuple(found)
+        findings.append(finding_of("all-held-out"))
+    return tuple(made), tuple(findings)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -76,10 +76,7 @@ class _Motion:
 
 
 def without_duplicates(runs: Sequence[Run]) -> list[Run]:
-    """Return runs without duplicated readings.
-
-    Of two runs that share readings, the held-out run loses them, else the shorter, else the later.
-    """
+    """Return runs without duplicates: held-out runs lose them, else shorter, else later ones."""
     made = list(runs)
     motions = [_Motion.of(run) for run in runs]
     order = sorted(range(len(runs)), key=lambda k: (runs[k].hold_out, -motions[k].theta.size, k))
@@ -154,11 +151,11 @@ def _lags(a: Floats, b: Floats, least: int) -> set[int]:
     count = np.maximum(count, 1.0)
     mean_a, mean_b = product(one_a, there_b) / count, product(there_a, one_b) / count
     squares = product(one_a**2, there_b) + product(there_a, one_b**2)
-    own = squares / count - mean_a**2 - mean_b**2
+    apart = squares / count - mean_a**2 - mean_b**2
     both = 2 * (product(one_a, one_b) / count - mean_a * mean_b)
     # The variance of the difference, and of the sum.
-    found = (np.argmin(np.where(enough, own + sign * both, np.inf)) for sign in (-1, 1))
-    return {int(correlation_lags(a.size, b.size)[k]) for k in found}
+    closest = (np.argmin(np.where(enough, apart + sign * both, np.inf)) for sign in (-1, 1))
+    return {int(correlation_lags(a.size, b.size)[k]) for k in closest}
 
 
 def _alike(a: Floats, b: Floats, step: float, other: float) -> bool:
@@ -185,15 +182,19 @@ def _without(run: Run, other: Run, first: int, count: int) -> Run:
     trusted[first : first + count] = False
     if int(trusted.sum()) < max(FEWEST_SHARED, LEAST_SHARE * before):
         trusted[:] = False
-    text = (
-        f"{run.name} is a copy of {other.name}: {before - int(trusted.sum())} of its"
-        f" {counted(before, 'reading')} are readings of that run, and are used once"
-    )
-    segments = run.segments
+    segments, held_out = run.segments, ""
     if not trusted.any():
         segments = tuple(dataclasses.replace(part, used=False) for part in segments)
-        text += ": a held-out duplicate is no independent test" if run.hold_out else ""
-    low, high = float(run.time[first]), float(run.time[first + count - 1])
-    found = Finding("same-record", text, mended=True, where=run.name, from_s=low, to_s=high)
-    findings = (*run.findings, found)
+        held_out = ": a held-out duplicate is no independent test" if run.hold_out else ""
+    copy = finding_of(
+        "same-record",
+        where=run.name,
+        span=(float(run.time[first]), float(run.time[first + count - 1])),
+        name=run.name,
+        other=other.name,
+        copied=before - int(trusted.sum()),
+        readings=counted(before, "reading"),
+        held_out=held_out,
+    )
+    findings = (*run.findings, copy)
     return dataclasses.replace(run, trusted=trusted, segments=segments, findings=findings)

@@ -1,4 +1,4 @@
-"""Angle of a record: read, integrated, or computed from pixels or an acceleration."""
+"""Rules of the angle: read, integrated, or computed from pixels or an acceleration."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from pendmap.records.rod_sensors import PLACE_EXAMPLE, angle_of_rate
 from pendmap.signal.robust import normal_scale
 
 if TYPE_CHECKING:
+    from pendmap.records.experiment import Finding
+    from pendmap.records.rod_sensors import Accelerometer
     from pendmap.records.work import Work
     from pendmap.signal import Floats
 
@@ -31,65 +33,88 @@ PERIOD_CHANGE: Final = 0.15  # Greatest relative change between successive perio
 CLOCK_SPREAD: Final = 1e-4  # Relative spread of intervals below which sampling is by a clock
 
 
-def make(work: Work) -> None:
-    """Compute the angle from the channels; remove rows without one."""
-    if "peaks" in work.extra and "angle" not in work.columns:
-        work.theta = work.extra.pop("peaks")
-        work.peaks_only = True
-        peaks = work.theta[np.isfinite(work.theta)]
-        if peaks.size and (np.all(peaks >= 0) or np.all(peaks <= 0)):
-            text = (
-                "the turning points have one sign: they are taken as one each half swing; if all"
-                " are of one side, w0 comes out half as large"
-            )
-            work.report("peaks-one-sign", text)
-    elif "angle" not in work.columns:
-        _derived(work)
-    _finite(work, "angle", work.theta)
-    huge = np.abs(work.theta) > LARGEST_ANGLE
-    if np.mean(huge) > MOST_HUGE:
-        largest = float(np.max(np.abs(work.theta)))
-        raise InputError(
-            f"{work.where}: angles must be up to {LARGEST_ANGLE:g} rad, got {largest:.3g} rad, too"
-            " large for a pendulum; a scale can be given in [columns] of experiment.toml"
-        )
-    work.leave_out(huge, "angle-huge", "number", f"beyond {LARGEST_ANGLE:g} rad left out")
-    work.refuse_short()
-    if not work.peaks_only:
-        _unwrap(work)
+def undeclared_peaks(work: Work) -> Finding | None:
+    """Report angles of a free record that look like turning points; exclude them from fits."""
+    good = np.isfinite(work.theta)
+    if not work.free or "angle" not in work.columns:
+        return None
+    pattern = _pattern(work.time[good], work.theta[good])
+    if not pattern:
+        return None
+    work.peaks_only = True
+    work.trusted[:] = False
+    return work.finding("peaks-undeclared", pattern=pattern, column=work.columns["angle"])
 
 
-def _finite(work: Work, what: str, *values: Floats) -> None:
+def _pattern(time: Floats, theta: Floats) -> str:
+    """Return the pattern of turning points that readings follow; empty for a sampled motion."""
+    if theta.size < FEWEST_PEAKS:
+        return ""
+    steps, size = np.diff(time), np.abs(theta)
+    slowly = np.abs(np.diff(steps)) < PERIOD_CHANGE * np.minimum(steps[1:], steps[:-1])
+    falls = np.diff(size) < PEAK_RISE * float(size.max())
+    regular = min(np.mean(slowly), np.mean(falls)) >= KEEP_PATTERN
+    if not regular or size[-1] > (1 - PEAK_RISE) * size[0]:
+        return ""
+    other_side = theta[1:] * theta[:-1] < 0
+    if np.mean(other_side) >= KEEP_PATTERN:
+        return "readings on one side and the other"
+    clocked = float(np.ptp(steps)) < CLOCK_SPREAD * float(np.mean(steps))
+    inward = np.mean(np.diff(theta) * np.sign(theta[0]) < 0) >= KEEP_PATTERN
+    return "slow readings on one side" if inward and not clocked and not other_side.any() else ""
+
+
+def turning_points(work: Work) -> Finding | None:
+    """Take declared turning points for the readings; report those of one sign."""
+    if "peaks" not in work.extra or "angle" in work.columns:
+        return None
+    work.theta = work.extra.pop("peaks")
+    work.peaks_only = True
+    peaks = work.theta[np.isfinite(work.theta)]
+    if not peaks.size or (np.any(peaks < 0) and np.any(peaks > 0)):
+        return None
+    return work.finding("peaks-one-sign")
+
+
+def source_missing(work: Work) -> Finding | None:
+    """Remove rows without a number for the channel from which the angle is computed."""
+    if "angle" in work.columns or work.peaks_only:
+        return None
+    if "pixel_x" in work.extra:
+        return _finite(work, "position", work.extra["pixel_x"], work.extra["pixel_y"])
+    if "velocity" in work.extra:
+        return _finite(work, "velocity", work.extra["velocity"])
+    _placed(work)
+    return _finite(work, "acceleration", work.extra["acceleration"])
+
+
+def _finite(work: Work, what: str, *values: Floats) -> Finding | None:
     """Remove rows in which a required channel has no number."""
     good = np.all([np.isfinite(v) for v in values], axis=0)
     if good.size and not good.any():
         raise InputError(f"{work.where}: the {what} must be numbers, no row has a number for it")
-    work.leave_out(~good, "angle-missing", "row", f"without a number for the {what} left out")
+    finding = work.leave_out(~good, "angle-missing", "row", channel=what)
     work.refuse_short()
+    return finding
 
 
-def _derived(work: Work) -> None:
+def derived(work: Work) -> Finding | None:
     """Compute the angle from pixels, a velocity or an acceleration, in this order."""
+    if "angle" in work.columns or work.peaks_only:
+        return None
     if "pixel_x" in work.extra:
-        _finite(work, "position", work.extra["pixel_x"], work.extra["pixel_y"])
-        _circle_angle(work, work.extra.pop("pixel_x"), work.extra.pop("pixel_y"))
-    elif "velocity" in work.extra:
-        _finite(work, "velocity", work.extra["velocity"])
-        rate = work.extra["velocity"]
-        work.theta = angle_of_rate(work.time, rate, np.abs(rate) < LARGEST_ANGLE)
-        work.integrated = True
-        text = (
-            "the angle is the integrated velocity; its zero is the middle of the swing: for"
-            " figures and the methods of peaks; the trajectory method fits the velocity itself"
-        )
-        work.report("angle-integrated", text, mended=True)
-    else:
-        _accelerated(work)
+        return _circle_angle(work, work.extra.pop("pixel_x"), work.extra.pop("pixel_y"))
+    if "velocity" not in work.extra:
+        return _accelerated(work)
+    rate = work.extra["velocity"]
+    work.theta = angle_of_rate(work.time, rate, np.abs(rate) < LARGEST_ANGLE)
+    work.integrated = True
+    return work.finding("angle-integrated")
 
 
-def _accelerated(work: Work) -> None:
-    """Compute the angle from an acceleration alone; the sensor's position must be known."""
-    sensor, why = work.accelerometer, ""
+def _placed(work: Work) -> Accelerometer:
+    """Return the accelerometer of a record; InputError if no angle follows from it alone."""
+    sensor = work.accelerometer
     if sensor is None:
         why = (
             "an acceleration alone gives an angle only if the place of the sensor is known:"
@@ -100,49 +125,30 @@ def _accelerated(work: Work) -> None:
         why = (
             "a radial acceleration alone cannot tell left from right: it must be the tangential one"
         )
-    elif work.plan.kind == "forced":
+    elif not work.free:
         why = "an acceleration alone on a forced run includes the pivot's: it must be a free decay"
-    if sensor is None or why:
-        raise InputError(
-            f"{work.where}: {why}, or the record must also have an angle, a velocity (gyroscope)"
-            " or pixel_x and pixel_y"
-        )
-    _finite(work, "acceleration", work.extra["acceleration"])
+    else:
+        return sensor
+    raise InputError(
+        f"{work.where}: {why}, or the record must also have an angle, a velocity (gyroscope)"
+        " or pixel_x and pixel_y"
+    )
+
+
+def _accelerated(work: Work) -> Finding:
+    """Compute the angle from an acceleration alone."""
+    sensor = _placed(work)
     doubt = angle_from(work, sensor)
     place = "an angular acceleration"
     if sensor.direction != "angular":
         removed = f"g = {sensor.gravity:g} m/s^2" if sensor.gravity else "gravity removed"
         place = f"a tangential acceleration {sensor.distance_m:g} m from the pivot, {removed}"
-    text = (
-        f"the angle is computed from {place}, without the part of the damping: approximate,"
-        " for figures and the methods of peaks; the trajectory method fits the acceleration itself"
-    )
-    work.report("angle-from-acceleration", text, mended=True)
-    if doubt:
-        work.report("acceleration-weak", doubt)
+    work.doubt = work.finding("acceleration-weak", doubt=doubt) if doubt else None
+    return work.finding("angle-from-acceleration", place=place)
 
 
-def _unwrap(work: Work) -> None:
-    """Unwrap the readings of a sensor that reads the angle modulo one turn."""
-    steps = np.diff(work.theta)
-    jumps = np.flatnonzero(np.abs(steps) > WRAP_JUMP * math.tau)
-    span = float(np.ptp(work.theta))
-    if not jumps.size or span > WRAPPED_SPAN * math.tau or span < 0.9 * math.tau:
-        return
-    work.theta = np.unwrap(work.theta)
-    text = f"the sensor wraps: {counted(jumps.size, 'jump')} of one turn undone"
-    work.report("angle-wrapped", text, mended=True, at=jumps + 1)
-    fastest = float(np.quantile(np.abs(np.diff(work.theta)), 0.999))
-    if fastest > math.pi / 2:
-        text = f"up to {fastest:.2g} rad from sample to sample: turns may be miscounted"
-        work.report("unwrapping-uncertain", text)
-
-
-def _circle_angle(work: Work, x: Floats, y: Floats) -> None:
-    """Compute the angle of points on a fitted circle, 0 downward, positive toward positive x.
-
-    Down is along y, on the side where the bob is fastest. Raises InputError without a circle.
-    """
+def _circle_angle(work: Work, x: Floats, y: Floats) -> Finding:
+    """Compute the angle of points on a fitted circle; down is along y, where the bob is fastest."""
     middle = np.array([np.median(x), np.median(y)])
     size = float(np.hypot(np.ptp(x), np.ptp(y)))
     if not size or not math.isfinite(size):
@@ -153,12 +159,12 @@ def _circle_angle(work: Work, x: Floats, y: Floats) -> None:
     solution = np.linalg.lstsq(columns, u**2 + v**2, rcond=None)[0]
     a, b = float(solution[0]) / 2, float(solution[1]) / 2
     radius = math.sqrt(max(float(solution[2]) + a * a + b * b, 1e-12))
-    kept = np.ones(u.size, bool)
+    near = np.ones(u.size, bool)
     for _ in range(2):
-        a, b, radius, error, rms = _geometric(u[kept], v[kept], a, b, radius)
+        a, b, radius, error, rms = _geometric(u[near], v[near], a, b, radius)
         away = np.abs(np.hypot(u - a, v - b) - radius)
         limit = 6 * max(normal_scale(away), 1e-9)
-        kept = away <= limit
+        near = away <= limit
     if not (math.isfinite(radius) and 0 < radius < 1e3):
         raise InputError(
             f"{work.where}: pixel_x and pixel_y must be positions of a bob on a circle,"
@@ -169,18 +175,11 @@ def _circle_angle(work: Work, x: Floats, y: Floats) -> None:
     down = 1.0 if np.median((v - b)[quick]) > 0 else -1.0
     work.theta = np.unwrap(np.arctan2(u - a, down * (v - b)))
     centre = middle + size * np.array([a, b])
-    text = (
-        f"the angle is that on a circle around ({centre[0]:.5g}, {centre[1]:.5g}) of radius"
-        f" {radius * size:.5g}, y counted {'down' if down > 0 else 'up'}ward; the places are"
-        f" {rms * size:.2g} from it, rms"
-    )
-    work.report("angle-from-pixels", text, mended=True)
     if error > RADIUS_DOUBT * radius:
-        text = (
-            f"the radius is uncertain by {100 * error / radius:.0f} %, and so is every angle: the"
-            " arc is short"
-        )
-        work.report("circle-uncertain", text)
+        work.doubt = work.finding("circle-uncertain", percent=100 * error / radius)
+    way, radius, rms = "down" if down > 0 else "up", radius * size, rms * size
+    x0, y0 = centre
+    return work.finding("angle-from-pixels", x=x0, y=y0, radius=radius, way=way, rms=rms)
 
 
 def _geometric(
@@ -201,39 +200,34 @@ def _geometric(
     return a, b, radius, error, rms
 
 
-def check_peaks(work: Work) -> None:
-    """Report angles of a free record that look like turning points; exclude them from fits.
-
-    Turning points alternate in sign or have one sign; amplitudes decrease, intervals are similar.
-    """
-    if work.plan.kind != "free" or "angle" not in work.columns:
-        return
-    good = np.isfinite(work.theta)
-    found = _pattern(work.time[good], work.theta[good])
-    if not found:
-        return
-    work.peaks_only = True
-    work.trusted[:] = False
-    text = (
-        f"{found}, ever smaller: if these are turning points only, one each half swing, "
-        f'give peaks = "{work.columns["angle"]}" in [columns] of experiment.toml'
-    )
-    work.report("peaks-undeclared", text)
+def missing(work: Work) -> Finding | None:
+    """Remove rows without an angle."""
+    return _finite(work, "angle", work.theta)
 
 
-def _pattern(time: Floats, theta: Floats) -> str:
-    """Return the pattern of turning points that readings follow; empty for a sampled motion."""
-    if theta.size < FEWEST_PEAKS:
-        return ""
-    steps, size = np.diff(time), np.abs(theta)
-    slowly = np.abs(np.diff(steps)) < PERIOD_CHANGE * np.minimum(steps[1:], steps[:-1])
-    falls = np.diff(size) < PEAK_RISE * float(size.max())
-    kept = min(np.mean(slowly), np.mean(falls)) >= KEEP_PATTERN
-    if not kept or size[-1] > (1 - PEAK_RISE) * size[0]:
-        return ""
-    other_side = theta[1:] * theta[:-1] < 0
-    if np.mean(other_side) >= KEEP_PATTERN:
-        return "readings on one side and the other"
-    regular = float(np.ptp(steps)) < CLOCK_SPREAD * float(np.mean(steps))
-    inward = np.mean(np.diff(theta) * np.sign(theta[0]) < 0) >= KEEP_PATTERN
-    return "slow readings on one side" if inward and not regular and not other_side.any() else ""
+def huge(work: Work) -> Finding | None:
+    """Remove implausible angles; InputError if most are."""
+    which = np.abs(work.theta) > LARGEST_ANGLE
+    if np.mean(which) > MOST_HUGE:
+        largest = float(np.max(np.abs(work.theta)))
+        raise InputError(
+            f"{work.where}: angles must be up to {LARGEST_ANGLE:g} rad, got {largest:.3g} rad, too"
+            " large for a pendulum; a scale can be given in [columns] of experiment.toml"
+        )
+    finding = work.leave_out(which, "angle-huge", "number", largest=LARGEST_ANGLE)
+    work.refuse_short()
+    return finding
+
+
+def wrapped(work: Work) -> Finding | None:
+    """Unwrap the readings of a sensor that reads the angle modulo one turn."""
+    steps = np.diff(work.theta)
+    jumps = np.flatnonzero(np.abs(steps) > WRAP_JUMP * math.tau)
+    span = float(np.ptp(work.theta))
+    if not jumps.size or span > WRAPPED_SPAN * math.tau or span < 0.9 * math.tau:
+        return None
+    work.theta = np.unwrap(work.theta)
+    fastest = float(np.quantile(np.abs(np.diff(work.theta)), 0.999))
+    if fastest > math.pi / 2:
+        work.doubt = work.finding("unwrapping-uncertain", step=fastest)
+    return work.finding("angle-wrapped", at=jumps + 1, jumps=counted(jumps.size, "jump"))

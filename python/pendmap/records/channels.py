@@ -11,7 +11,7 @@ import numpy as np
 from pendmap.errors import InputError, short_repr
 from pendmap.model.quantities import GRAVITY
 from pendmap.records.description import Column
-from pendmap.records.experiment import Finding
+from pendmap.records.findings import finding_of
 from pendmap.records.rod_sensors import accelerometer_of
 from pendmap.records.units import CHANNELS, PIVOT_UNITS, name_and_unit, plain, spelling
 from pendmap.records.work import Work
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
 
     from pendmap.records.description import Description, RunPlan
+    from pendmap.records.experiment import Finding
     from pendmap.records.tables import Table
     from pendmap.signal import Floats
 
@@ -67,8 +68,8 @@ def channels_of(  # noqa: C901 (a step each)
     if rate and "time" not in places:
         values["time"], heads["time"] = table.order / rate, f"{rate:g} readings a second"
     elif rate:
-        text = f"{head_of(table, places['time'])!r} has the times: rate_hz {rate:g} is not used"
-        findings.append(Finding("rate-unused", text))
+        head = head_of(table, places["time"])
+        findings.append(finding_of("rate-unused", column=head, rate=rate))
     _check(places, table, where, timed="time" in values)
     for channel, place in places.items():
         column, counts = asked.get(channel, Column()), known.get("encoder_counts")
@@ -76,6 +77,8 @@ def channels_of(  # noqa: C901 (a step each)
         values[channel] = _in_si(channel, raw, head, column, counts, f"{where}: {channel}")
         heads[channel] = head_of(table, place)
     pivot, pivot_unit, carried = _pivot(table, plan, where)
+    if plan.pivot and "unit" not in plan.pivot:
+        findings.append(finding_of("pivot-unit.missing"))
     unused, questions = _unused(table, {*places.values(), *carried}, places, plan)
     findings += questions
     sensor, missing = None, ""
@@ -85,7 +88,7 @@ def channels_of(  # noqa: C901 (a step each)
         sensor, missing = accelerometer_of(asked.get("acceleration", Column()), head, gravity)
     edges = asked.get("trigger", Column())
     time = values.pop("time")
-    work = Work(
+    return Work(
         where=where,
         plan=plan,
         known=known,
@@ -105,11 +108,6 @@ def channels_of(  # noqa: C901 (a step each)
         phase=edges.phase,
         pivot_unit=pivot_unit,
     )
-    if plan.pivot and "unit" not in plan.pivot:
-        work.report(
-            "pivot-unit", 'the pivot has no unit: assumed to be an acceleration, unit = "m/s2"'
-        )
-    return work
 
 
 def _place(name: str, table: Table, where: str) -> int:
@@ -191,15 +189,15 @@ def _pivot(
         if way in plan.pivot
     }
     scale = plan.pivot_scale
-    found = {way: table.values[:, place] * factor * scale for way, place in places.items()}
-    return found, unit, list(places.values())
+    motion = {way: table.values[:, place] * factor * scale for way, place in places.items()}
+    return motion, unit, list(places.values())
 
 
 def use_pixels(table: Table, places: dict[str, int], asked: Mapping[str, Column]) -> list[Finding]:
     """Assign the pixel coordinates of a table whose angle column is constant."""
-    found = _by_name(table, {k: v for k, v in places.items() if k != "angle"})
-    place = places.get("angle", found.get("angle"))
-    both = found | places
+    guessed = _by_name(table, {k: v for k, v in places.items() if k != "angle"})
+    place = places.get("angle", guessed.get("angle"))
+    both = guessed | places
     pair: dict[str, int] = {c: both[c] for c in ("pixel_x", "pixel_y") if c in both}
     if place is None or "angle" in asked or len(pair) < 2:
         return []
@@ -208,8 +206,7 @@ def use_pixels(table: Table, places: dict[str, int], asked: Mapping[str, Column]
     places.pop("angle", None)
     places.update(pair)
     x, y = (table.names[k] for k in pair.values())
-    text = f"{head_of(table, place)!r} never changes: the angle is computed from {x!r} and {y!r}"
-    return [Finding("angle-constant", text, mended=True)]
+    return [finding_of("angle-constant", angle=head_of(table, place), x=x, y=y)]
 
 
 def guess(table: Table, places: dict[str, int], *, timed: bool) -> list[Finding]:
@@ -232,15 +229,12 @@ def guess(table: Table, places: dict[str, int], *, timed: bool) -> list[Finding]
         free = [k for k in range(table.values.shape[1]) if k not in guessed.values()]
         guessed |= {"angle": free[0]} if len(free) == 1 else {}
     places.update(guessed)
-    said = ", ".join(f"{channel} is {table.names[k]!r}" for channel, k in guessed.items())
-    return [Finding("columns-guessed", f"by their names {said}")] if guessed else []
+    names = ", ".join(f"{channel} is {table.names[k]!r}" for channel, k in guessed.items())
+    return [finding_of("columns-guessed", names=names)] if guessed else []
 
 
 def _by_name(table: Table, places: dict[str, int]) -> dict[str, int]:
-    """Return columns with common names for channels that have none.
-
-    Of several axes of a sensor, the one with the greatest variance; of other columns, the first.
-    """
+    """Return columns with common names for channels without; of axes, that which varies most."""
     guessed: dict[str, int] = {}
     for channel, kind in CHANNELS.items():
         taken = {*places.values(), *guessed.values()}
@@ -267,7 +261,7 @@ def _fitting(table: Table, channel: str, names: str) -> list[int]:
 def _by_position(table: Table, places: dict[str, int], *, timed: bool) -> list[Finding]:
     """Assign time and angle in a table without headings."""
     free = [k for k in range(table.values.shape[1]) if k not in places.values()]
-    said = []
+    guesses = []
     if not timed:  # the rate is known: ignore columns that number the readings
         free = [k for k in free if np.any(np.diff(table.values[:, k]) != 1)]
     if "time" not in places and free:
@@ -276,11 +270,12 @@ def _by_position(table: Table, places: dict[str, int], *, timed: bool) -> list[F
         if k is not None:
             places["time"] = k
             free.remove(k)
-            said.append(f"column {k + 1} is the time in s")
+            guesses.append(f"column {k + 1} is the time in s")
     if free and not any(channel in places for channel in ANGLE_CHANNELS):
         places["angle"] = free[0]
-        said.append(f"column {free[0] + 1} is the angle")
-    return [Finding("columns-guessed", f"no line of names: {', '.join(said)}")] if said else []
+        guesses.append(f"column {free[0] + 1} is the angle")
+    finding = finding_of("columns-guessed.places", names=", ".join(guesses))
+    return [finding] if guesses else []
 
 
 def _orders(values: Floats) -> bool:
@@ -297,23 +292,20 @@ def _rises(values: Floats) -> bool:
 
 
 def position_of(table: Table, places: Mapping[str, int]) -> int | None:
-    """Return the column named position if it is the angle, or None.
-
-    It must correlate with the integrated velocity, if any, since a cart has a position, too.
-    """
+    """Return the column named position, unless it contradicts a velocity; else None."""
     from scipy.signal import detrend
 
     taken = places.values()
-    found = [k for k in _fitting(table, "angle", POSITION_NAME) if k not in taken]
-    if len(found) != 1 or "velocity" not in places:
-        return found[0] if len(found) == 1 else None
-    both = table.values[:, [found[0], places["velocity"]]]
+    fitting = [k for k in _fitting(table, "angle", POSITION_NAME) if k not in taken]
+    if len(fitting) != 1 or "velocity" not in places:
+        return fitting[0] if len(fitting) == 1 else None
+    both = table.values[:, [fitting[0], places["velocity"]]]
     both = both[np.isfinite(both).all(axis=1)]
     if both.shape[0] < 5:
         return None
     one, other = detrend(both[:, 0]), detrend(np.cumsum(both[:, 1]))
     size = float(np.linalg.norm(one) * np.linalg.norm(other))
-    return found[0] if size > 0 and float(one @ other) > POSITION_AGREES * size else None
+    return fitting[0] if size > 0 and float(one @ other) > POSITION_AGREES * size else None
 
 
 def head_of(table: Table, place: int) -> str:
@@ -336,11 +328,11 @@ def _unused(
     names = tuple(head_of(table, k) for k in rest)
     if not rest:
         return (), []
-    findings = [Finding("columns-unused", f"not used: {_listed(names, MOST_UNUSED)}")]
+    findings = [finding_of("columns-unused", names=_listed(names, MOST_UNUSED))]
     for k in rest:
         if changes(table.values[:, k]):
             findings += _suggestion(head_of(table, k), channels, plan)
-    seen = {found.what: found for found in reversed(findings)}  # the first of each kind
+    seen = {finding.what: finding for finding in reversed(findings)}  # the first of each kind
     return names, list(reversed(seen.values()))
 
 
@@ -348,20 +340,14 @@ def _suggestion(head: str, channels: Collection[str], plan: RunPlan) -> list[Fin
     """Return the finding that a heading suggests: a motor, an angle or a pivot."""
     name, unit = name_and_unit(head)
     name, unit = plain(name), spelling(unit or "")
-    said = plain(head)
+    words = plain(head)
     if (MOTOR_NAMES.search(name) or unit in MOTOR_UNITS) and plan.kind == "free":
-        text = f"{head!r} looks like a motor's: a driven record is no free decay"
-        return [Finding("motor-column", text)]
+        return [finding_of("motor-column", head=head)]
     bare = "angle" not in channels and "peaks" not in channels
     if bare and (ANGLE_NAMES.fullmatch(name) or unit in {"rad", "deg", "°"}):
-        text = f"{head!r} may be the angle itself: angle = {{ name = {head!r} }} in [columns]"
-        return [Finding("angle-column", f"{text} of experiment.toml reads it")]
-    if PIVOT_NAMES.search(said) and plan.pivot is None:
-        kind = next((u for pattern, u in PIVOT_KINDS if re.search(pattern, said)), "m")
+        return [finding_of("angle-column", head=head)]
+    if PIVOT_NAMES.search(words) and plan.pivot is None:
+        kind = next((u for pattern, u in PIVOT_KINDS if re.search(pattern, words)), "m")
         unit = unit if unit in PIVOT_UNITS else kind
-        text = (
-            f'{head!r} may be the pivot\'s: pivot = {{ horizontal = "{head}", unit = "{unit}" }}'
-            " (or vertical) in [[run]] of experiment.toml reads it"
-        )
-        return [Finding("pivot-column", text)]
+        return [finding_of("pivot-column", head=head, unit=unit)]
     return []

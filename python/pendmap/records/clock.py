@@ -14,11 +14,13 @@ from pendmap.errors import InputError
 from pendmap.formatting import Estimate, counted, estimate_text, listed, moment
 from pendmap.records.resolution import FEWEST_EDGES, logs_edges, spread_stamps
 from pendmap.records.slips import slips_of
+from pendmap.records.work import FEWEST_SAMPLES
 from pendmap.signal.robust import intervals_of
 
 if TYPE_CHECKING:
+    from pendmap.records.experiment import Finding
     from pendmap.records.work import Work
-    from pendmap.signal import Floats, Indices
+    from pendmap.signal import Floats, Indices, Stretch
 
 
 RESTART: Final = 10  # Least decrease at a clock's restart, intervals; fewest samples of each part
@@ -33,79 +35,49 @@ AROUND: Final = 101  # Readings around one whose second differences are usual th
 EXACT: Final = 1e-6  # Share of a tick below which a distance is rounding
 
 
-def mend(work: Work) -> None:
-    """Make the times strictly increasing and report changes; InputError if this is impossible."""
-    missing = ~np.isfinite(work.time)
-    if missing.all():
+def missing(work: Work) -> Finding | None:
+    """Remove rows without a time; InputError if no row has one."""
+    bad = ~np.isfinite(work.time)
+    if bad.all():
         raise InputError(f"{work.where}: the times must be numbers, got no row with a time")
-    work.leave_out(missing, "time-missing", "row", "without a time left out")
+    finding = work.leave_out(bad, "time-missing", "row")
     if work.time.size < 2:
         work.refuse_short()
-    _stopped(work)
-    _wrapped(work)
-    _restarted(work)
-    _coarse(work)
-    _ordered(work)
-    if work.time.size < 2 or not work.time[-1] > work.time[0]:
-        raise InputError(f"{work.where}: the times must be in order, they do not increase")
-    _spacing(work)
+    return finding
 
 
-def cut_at_pauses(work: Work) -> None:
-    """Keep the larger side, by samples, of a pause longer than the rest of the record."""
-    while work.time.size > 2:
-        steps = np.diff(work.time)
-        at = int(np.argmax(steps)) + 1
-        pause = steps[at - 1]
-        rest = float(work.time[-1] - work.time[0] - pause)
-        if pause <= max(rest, RESTART * float(np.median(steps))):
-            return
-        places = np.arange(work.time.size)
-        side = "before" if at >= work.time.size - at else "after"
-        text = (
-            f"a pause of {pause:.3g} s, longer than the rest of the record: the part {side} it is"
-            " used; from_s and to_s choose another"
-        )
-        work.report("time-pause", text, at=np.array([at]))
-        work.keep(places < at if side == "before" else places >= at)
-
-
-def _stopped(work: Work) -> None:
+def stopped(work: Work) -> Finding | None:
     """Remove readings that continue while the clock is stopped."""
     edges = np.flatnonzero(np.diff(work.time, prepend=np.nan, append=np.nan) != 0)
-    each = np.diff(edges)
-    usual = int(np.median(each))
-    stops = np.flatnonzero(each > max(STOPPED_READINGS, RESTART * usual))
-    if not stops.size or stops.size == each.size:
-        return
+    number = np.diff(edges)
+    usual = int(np.median(number))
+    stops = np.flatnonzero(number > max(STOPPED_READINGS, RESTART * usual))
+    if not stops.size or stops.size == number.size:
+        return None
     # After a decrease even the first of the equal stamps is wrong.
-    own = work.time[edges[stops]] >= work.time[np.maximum(edges[stops] - 1, 0)]
-    begin, end = edges[stops] + usual * own, edges[stops + 1]
+    right = work.time[edges[stops]] >= work.time[np.maximum(edges[stops] - 1, 0)]
+    begin, end = edges[stops] + usual * right, edges[stops + 1]
     out = np.concatenate([np.arange(a, b) for a, b in zip(begin, end, strict=True)])
     times = listed([moment(work.time[k]) for k in begin], 3)
-    text = (
-        f"the clock stops at {times} s while the readings go on: {counted(out.size, 'reading')}"
-        " without own times left out"
-    )
-    work.report("time-stops", text, mended=True, at=begin)
+    readings = counted(out.size, "reading")
+    finding = work.finding("time-stops", at=begin, times=times, readings=readings)
     work.keep(np.delete(np.arange(work.time.size), out))
+    return finding
 
 
-def _wrapped(work: Work) -> None:
+def wrapped(work: Work) -> Finding | None:
     """Unwrap a clock counter that overflowed."""
     steps = np.diff(work.time)
     usual = float(np.median(np.abs(steps)))
     for wrap in COUNTER_WRAPS:
-        slack = max(20 * usual, 1e-9)
-        at = np.flatnonzero(np.abs(steps + wrap) < slack)
+        at = np.flatnonzero(np.abs(steps + wrap) < max(20 * usual, 1e-9))
         if at.size and wrap > 100 * usual and np.all(steps[at] < 0):
             work.time[1:] += wrap * np.cumsum(np.isin(np.arange(steps.size), at))
-            text = f"the counter of the clock wrapped {counted(at.size, 'time')}: continued"
-            work.report("time-wrapped", text, mended=True, at=at + 1)
-            return
+            return work.finding("time-wrapped", at=at + 1, wraps=counted(at.size, "time"))
+    return None
 
 
-def _restarted(work: Work) -> None:
+def restarted(work: Work) -> Finding | None:
     """Keep the longest part of a record whose clock restarts."""
     steps = np.diff(work.time)
     usual = float(np.median(steps[steps > 0])) if np.any(steps > 0) else math.inf
@@ -118,62 +90,81 @@ def _restarted(work: Work) -> None:
         if again and before.size > RESTART:
             edges.append(low)
     if len(edges) == 1:
-        return
+        return None
     starts = np.array(edges[1:])
-    edges.append(work.time.size)
-    best = int(np.argmax(np.diff(edges)))
-    low, high = edges[best : best + 2]
-    text = (
-        f"the clock starts again {counted(starts.size, 'time')}: of {starts.size + 1} parts the"
-        f" longest is used, rows {work.rows[low]} to {work.rows[high - 1]}"
+    low, high = longest_between(edges, work.time.size)
+    finding = work.finding(
+        "time-restarts",
+        at=starts,
+        starts=counted(starts.size, "time"),
+        parts=starts.size + 1,
+        first=work.rows[low],
+        last=work.rows[high - 1],
     )
-    work.report("time-restarts", text, at=starts)
     work.keep(np.arange(low, high))
+    return finding
 
 
-def _coarse(work: Work) -> None:
-    """Space readings evenly if stamps are in coarse ticks: over the record, else over each tick."""
+def longest_between(edges: list[int], size: int) -> Stretch:
+    """Return the longest of the parts that begin at some indices, the first of which is 0."""
+    ends = [*edges[1:], size]
+    return max(zip(edges, ends, strict=True), key=lambda part: part[1] - part[0])
+
+
+def edge_stamps(work: Work) -> Finding | None:
+    """Spread the equal stamps of a log of an encoder's edges over the clock's tick."""
+    if not _even_if_coarse(work) or not logs_edges(work.theta):
+        return None
+    same = float(np.mean(np.diff(work.time) == 0))
+    if not same:
+        return None
+    work.time = spread_stamps(work.time)
+    return work.finding("time-coarse.edges", percent=100 * same)
+
+
+def _even_if_coarse(work: Work) -> bool:
+    """Return whether the stamps increase, and thus may be those of a coarse clock."""
     steps = np.diff(work.time)
-    same = float(np.mean(steps == 0)) if steps.size else 0.0
-    if work.peaks_only or same == 1 or np.any(steps < 0):
-        return
-    if logs_edges(work.theta):
-        if same:
-            work.time = spread_stamps(work.time)
-            text = f"{100 * same:.2g} % of the edges share the stamp before: spread evenly over it"
-            work.report("time-coarse", text, mended=True)
-        return
+    return steps.size > 0 and bool(np.all(steps >= 0) and np.any(steps > 0))
+
+
+def coarse(work: Work) -> Finding | None:
+    """Space readings evenly if stamps are in coarse ticks: over the record, else over a tick."""
+    if not _even_if_coarse(work) or logs_edges(work.theta):
+        return None
+    steps = np.diff(work.time)
+    same = float(np.mean(steps == 0))
     rise = steps - steps.min(initial=0.0 if same else math.inf)
     usual = float(np.median(steps[steps > 0]))
     rise = rise[rise > REPORTED_JITTER * usual]
     channels = np.stack([work.theta, *work.extra.values(), *work.pivot.values()])
     again = np.all(np.diff(channels, axis=1)[:, steps == 0] == 0, axis=0)  # samples and stamps
     if not rise.size or (same and np.mean(again) > 0.9):
-        return
+        return None
     ticks = _ticks(work.time, rise, steps, channels, same=same)
     if ticks is None:
-        return
+        return None
     tick, even = ticks
+    missing, few = "", ""
     place = np.arange(work.time.size)
     slips = slips_of(even.times, work.theta, fewest=1)
     if slips is not None:  # readings are lost where the others jump, if the stamps allow it
         lost = np.round((slips.time - even.times) / even.interval).astype(np.intp)
         if (whole := _even(work.time, place + lost, tick)).missed <= max(even.missed, 0.0):
             even = whole
-            text = f"{counted(int(lost[-1]), 'reading')} lost, where the others jump"
-            work.report("time-slips", text, mended=True, at=slips.places)
+            missing = f", {counted(int(lost[-1]), 'reading')} lost where the others jump"
     work.clock_stderr = even.stderr / even.interval
-    text = f"stamps in ticks of {tick:.3g} s: the readings are spread evenly"
     if even.missed <= even.interval:
-        rate = Estimate(1 / even.interval, work.clock_stderr / even.interval)
-        work.report("time-coarse", f"{text}, {estimate_text(rate)} Hz", mended=True)
+        rate = estimate_text(Estimate(1 / even.interval, work.clock_stderr / even.interval))
         work.time = even.times
-        return
-    work.report("time-coarse", f"{text} over each tick, no rate fits all", mended=True)
+        return work.finding("time-coarse.even", tick=tick, lost=missing, rate=rate)
     _, number = np.unique(work.time, return_counts=True)
-    few = np.repeat(number < np.median(number) - 1, number)
+    out = np.repeat(number < np.median(number) - 1, number)
     work.time = spread_stamps(work.time)
-    work.leave_out(few, "time-coarse", "reading", "in ticks that lack readings left out")
+    work.keep(~out)
+    if out.any():
+        few = f"; {counted(int(out.sum()), 'reading')} in ticks that lack readings left out"
+    return work.finding("time-coarse.tick", tick=tick, lost=missing, few=few)
 
 
 def _ticks(
@@ -241,39 +232,47 @@ def _even(time: Floats, place: Indices, tick: float) -> _Even:
     return _Even(usual + slope, spread, times, missed)
 
 
-def _ordered(work: Work) -> None:
-    """Reverse, sort or remove rows whose times do not increase."""
-    # Stamps that differ by rounding alone are equal.
-    near = 2 * float(np.spacing(np.max(np.abs(work.time))))
-    steps = np.diff(work.time)
-    if np.all(steps > near):
-        return
-    if np.all(steps < -near):
-        work.keep(np.arange(work.time.size)[::-1])
-        work.report("time-backwards", "the rows run backwards in time: reversed", mended=True)
-        return
-    again = np.append(False, np.abs(steps) <= near)
+def backwards(work: Work) -> Finding | None:
+    """Reverse rows that run backwards in time."""
+    if not np.all(np.diff(work.time) < -_rounding(work.time)):
+        return None
+    work.keep(np.arange(work.time.size)[::-1])
+    return work.finding("time-backwards.reversed")
+
+
+def repeated(work: Work) -> Finding | None:
+    """Remove rows with the time of the row before."""
+    again = np.append(False, np.abs(np.diff(work.time)) <= _rounding(work.time))
     alike = np.sum(np.diff(work.theta, prepend=np.nan)[again] == 0)
-    why = f"twice ({alike} with the same reading): the first of each kept"
-    work.leave_out(again, "time-duplicate", "time stamp", why)
-    kept = _longest_rising(work.time)
-    out = np.setdiff1d(np.arange(work.time.size), kept)
-    if not out.size:
-        return
+    return work.leave_out(again, "time-duplicate", "time stamp", alike=alike)
+
+
+def unordered(work: Work) -> Finding | None:
+    """Sort rows out of order, if the angle is then smooth, or remove the fewest."""
+    if np.all(np.diff(work.time) > 0):
+        return None
+    rising = _longest_rising(work.time)
+    out = np.setdiff1d(np.arange(work.time.size), rising)
     order = np.argsort(work.time, kind="stable")
     if _smoother(work.theta[order], np.flatnonzero(np.isin(order, out))):
-        text = f"{counted(out.size, 'row')} out of order in time: sorted by time"
-        kept = order
+        key, number = "time-backwards.sorted", counted(out.size, "row")
+        rising = order
     elif out.size > MOST_UNORDERED * work.time.size:
         raise InputError(
             f"{work.where}: the times must be in order, {out.size} of {work.time.size} are out"
             " of order, and sorted by time the angles are no smooth motion"
         )
     else:
-        text = f"{counted(out.size, 'time stamp')} out of order, left out"
-    work.report("time-backwards", text, mended=True, at=out)
-    work.keep(kept)
-    work.keep(np.append(True, np.diff(work.time) > near))
+        key, number = "time-backwards.left-out", counted(out.size, "time stamp")
+    finding = work.finding(key, at=out, number=number)
+    work.keep(rising)
+    work.keep(np.append(True, np.diff(work.time) > _rounding(work.time)))
+    return finding
+
+
+def _rounding(time: Floats) -> float:
+    """Return the difference below which stamps are equal, s."""
+    return 2 * float(np.spacing(np.max(np.abs(time))))
 
 
 def _smoother(theta: Floats, at: Indices) -> bool:
@@ -311,25 +310,75 @@ def _longest_rising(time: Floats) -> Indices:
     return np.asarray(chain[::-1], np.intp)
 
 
-def _spacing(work: Work) -> None:
-    """Report gaps, uneven intervals and jitter."""
-    steps = np.diff(work.time)
-    found = intervals_of(work.time)
-    usual, gaps = found.tick, found.gaps
-    if gaps.size > steps.size / 4:
-        text = f"the samples are uneven: intervals from {steps.min():.3g} to {steps.max():.3g} s"
-        work.report("time-uneven", text)
+def gaps(work: Work) -> Finding | None:
+    """Report gaps and uneven intervals; InputError for times that do not increase."""
+    if work.time.size < 2 or not work.time[-1] > work.time[0]:
+        raise InputError(f"{work.where}: the times must be in order, they do not increase")
+    steps, intervals = np.diff(work.time), intervals_of(work.time)
+    at = intervals.gaps
+    if at.size > steps.size / 4:
+        return work.finding("time-uneven", low=steps.min(), high=steps.max())
+    if not at.size:
+        return None
+    worst = at[int(np.argmax(steps[at]))]
+    low, high = work.time[worst : worst + 2].tolist()
+    return work.finding(
+        "time-gap",
+        at=at,
+        span=(low, high),
+        gaps=counted(at.size, "gap"),
+        samples=counted(intervals.missing, "sample"),
+        longest=steps[worst],
+        at_s=moment(low),
+    )
+
+
+def jitter(work: Work) -> Finding | None:
+    """Report intervals that scatter."""
+    steps, intervals = np.diff(work.time), intervals_of(work.time)
+    usual, at = intervals.tick, intervals.gaps
+    spread = math.sqrt(float(np.mean((np.delete(steps, at) - usual) ** 2)))
+    if at.size > steps.size / 4 or spread <= REPORTED_JITTER * usual:
+        return None
+    percent = 100 * spread / usual
+    return work.finding("time-jitter", spread=spread, percent=percent, interval=usual)
+
+
+def no_clock(work: Work) -> None:
+    """Drop findings about intervals that are those of turning points or encoder edges."""
+    if work.peaks_only or work.edges:
+        work.findings = [finding for finding in work.findings if finding.what not in SPACING]
+
+
+def cut(work: Work) -> None:
+    """Keep the samples between ``from_s`` and ``to_s`` of the description."""
+    low, high = work.plan.from_s, work.plan.to_s
+    if low is None and high is None:
         return
-    if gaps.size:
-        worst = gaps[int(np.argmax(steps[gaps]))]
-        low, high = work.time[worst : worst + 2].tolist()
-        text = (
-            f"{counted(gaps.size, 'gap')}, about {counted(found.missing, 'sample')} missing; the"
-            f" longest {steps[worst]:.3g} s at {moment(low)} s"
+    first, last = float(work.time[0]), float(work.time[-1])
+    low, high = -math.inf if low is None else low, math.inf if high is None else high
+    work.keep((work.time >= low) & (work.time <= high))
+    if work.time.size < FEWEST_SAMPLES:
+        raise InputError(
+            f"{work.where}: from_s and to_s must be times within {first:g} to {last:g} s, they"
+            f" leave {counted(work.time.size, 'sample')}"
         )
-        work.report("time-gap", text, at=gaps, span=(low, high))
-    spread = math.sqrt(float(np.mean((np.delete(steps, gaps) - usual) ** 2)))
-    if spread > REPORTED_JITTER * usual:
-        share = 100 * spread / usual
-        text = f"the intervals jitter by {spread:.2g} s rms, {share:.0f} % of {usual:.4g} s"
-        work.report("time-jitter", text)
+
+
+def pause(work: Work) -> Finding | None:
+    """Keep the larger side, by samples, of each pause longer than the rest of the record."""
+    finding = None
+    while work.time.size > 2:
+        steps = np.diff(work.time)
+        at = int(np.argmax(steps)) + 1
+        longest = steps[at - 1]
+        rest = float(work.time[-1] - work.time[0] - longest)
+        if longest <= max(rest, RESTART * float(np.median(steps))):
+            break
+        places = np.arange(work.time.size)
+        side = "before" if at >= work.time.size - at else "after"
+        if finding is not None:
+            work.findings.append(finding)
+        finding = work.finding("time-pause", at=np.array([at]), pause=longest, side=side)
+        work.keep(places < at if side == "before" else places >= at)
+    return finding

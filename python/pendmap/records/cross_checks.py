@@ -1,14 +1,11 @@
-"""Consistency checks of channels: velocity, acceleration and pivot against the angle.
+"""Rules of other channels: velocity, acceleration and pivot against the angle.
 
-A tangential accelerometer at distance ``r`` reads ``(g - r w0**2) sin(th)``, so a swing leaves its
-distance and the sense of its axis ambiguous. A step ``s`` of a pivot's position sampled every ``h``
-seconds is one of ``s / h^2`` in its acceleration (1000 m/s^2 for 1 mm at 1 kHz): stepwise positions
-are smoothed by cubics.
+A step ``s`` of a pivot's position sampled every ``h`` seconds is one of ``s / h^2`` in its
+acceleration (1000 m/s^2 for 1 mm at 1 kHz): stepwise positions are smoothed by cubics.
 """
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import math
 from typing import TYPE_CHECKING, Final
@@ -16,15 +13,14 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.formatting import counted
-from pendmap.model.quantities import GRAVITY
 from pendmap.records.resolution import step_of
-from pendmap.records.rod_sensors import Accelerometer
 from pendmap.signal.local_polynomial import local_fit
 from pendmap.signal.robust import even_times
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from pendmap.records.experiment import Finding
     from pendmap.records.work import Work
     from pendmap.signal import Floats
 
@@ -34,8 +30,6 @@ GAIN_OFF: Final = 0.1  # Greatest relative error of a gain that a channel's filt
 CERTAIN_SIGN: Final = 8.0  # Standard errors above which a coefficient has the wrong sign
 FARTHEST_PIVOT: Final = {"m": 3.0, "m/s": 60.0, "m/s2": 3000.0}  # Greatest plausible span by unit
 DERIVATIVE_SPAN: Final = 0.12  # Window of the polynomials that give derivatives, periods
-# Text on the role of an acceleration recorded with an angle
-CHECK_ONLY: Final = "a check, not fitted: the angle is"
 PIVOT_ORDER: Final = {"m": 2, "m/s": 1}  # Order of differentiation to an acceleration, by unit
 NOISE_SHARE: Final = 0.05  # Greatest noise of the pivot's acceleration, over its largest value
 STEPS_PASSED: Final = 4.0  # Fewest resolution steps that a moving pivot passes within a window
@@ -43,81 +37,59 @@ LONGEST_WINDOW: Final = 0.2  # Longest window of more than five readings, s
 MOVING_SHARE: Final = 0.2  # Speed, over the largest, above which the pivot is moving
 
 
-def check(work: Work) -> None:
-    """Invert channels with the opposite sign of the angle; report inconsistent channels."""
-    if "velocity" in work.extra:
-        _velocity(work)
-    if "acceleration" in work.extra:
-        _acceleration(work)
-    if work.plan.kind != "forced":
-        return
-    for way, values in work.pivot.items():
-        good = values[np.isfinite(values)]
-        span = float(np.ptp(good)) if good.size else 0.0
-        if work.pivot_unit and span > FARTHEST_PIVOT[work.pivot_unit]:
-            text = f"the pivot's {way} motion spans {span:.4g} {work.pivot_unit}"
-            work.report("pivot-unit", f"{text}: its unit is wrong")
-    _drive_sign(work)
-
-
-def _velocity(work: Work) -> None:
+def velocity(work: Work) -> Finding | None:
     """Compare a velocity with the angle's derivative: invert, rescale or remove it."""
-    velocity = work.extra["velocity"]
-    if missing := int(np.count_nonzero(~np.isfinite(velocity))):
-        text = f"{counted(missing, 'sample')} without velocity: the channel is left out"
-        work.report("velocity-missing", text)
+    if work.integrated or "velocity" not in work.extra:
+        return None  # nothing to compare it with
+    values = work.extra["velocity"]
+    if missing := int(np.count_nonzero(~np.isfinite(values))):
         del work.extra["velocity"]
-        return
-    if work.integrated:
-        return  # nothing to compare it with
+        return work.finding("velocity-missing", number=counted(missing, "sample"))
     fit = local_fit(work.time, work.theta)
     which = work.trusted[fit.middle]
-    slope, seen = fit.slope[which], velocity[fit.middle][which]
+    slope, seen = fit.slope[which], values[fit.middle][which]
     scale = float(np.max(np.abs(seen), initial=0.0))
-    if slope.size < 10 or scale == 0 or float(np.std(slope)) == 0 or float(np.std(seen)) == 0:
-        return
+    if slope.size < 10 or 0 in (scale, float(np.std(slope)), float(np.std(seen))):
+        return None
     seen = seen / scale  # squares of huge numbers overflow
     alike = float(np.corrcoef(slope, seen)[0, 1])
     if abs(alike) < SAME_MOTION:
-        text = f"the velocity does not follow the angle (correlation {alike:.2f}): it is left out"
-        work.report("velocity-unlike", text)
         del work.extra["velocity"]
-        return
+        return work.finding("velocity-unlike", alike=alike)
     gain = abs(float(np.dot(slope, seen) / np.dot(slope, slope)) * scale)
-    if alike < 0:
-        _turn(work, "velocity")
     if abs(gain * math.pi / 180 - 1) < GAIN_OFF and "velocity" not in work.declared:
-        work.extra["velocity"] = work.extra["velocity"] * math.pi / 180
-        text = f"the velocity is {gain:.3g} times the angle's: degrees a second"
-        work.report("velocity-unit", text, mended=True)
+        work.extra["velocity"] = values * math.pi / 180
+        work.doubt = work.finding("velocity-unit", gain=gain)
     elif abs(gain - 1) > GAIN_OFF:
-        work.report("velocity-scale", f"the velocity is {gain:.3g} times the angle's derivative")
+        work.doubt = work.finding("velocity-scale", gain=gain)
+    if alike > 0:
+        return None
+    work.extra["velocity"] = -work.extra["velocity"]
+    return work.finding("sign-turned.velocity")
 
 
-def _turn(work: Work, channel: str) -> None:
-    """Invert a channel with the opposite sign of the angle, and report it."""
-    work.extra[channel] = -work.extra[channel]
-    text = f"the {channel} has the opposite sign to the angle: inverted to agree with the angle"
-    work.report("sign-turned", text, mended=True)
+def pivot_unit(work: Work) -> Finding | None:
+    """Report a pivot whose motion is implausible in its unit."""
+    for way, values in work.pivot.items():
+        span = float(np.nanmax(values) - np.nanmin(values)) if np.isfinite(values).any() else 0.0
+        if work.pivot_unit and span > FARTHEST_PIVOT[work.pivot_unit]:
+            return work.finding("pivot-unit.wrong", way=way, extent=span, unit=work.pivot_unit)
+    return None
 
 
-def _drive_sign(work: Work) -> None:
-    """Regress the second derivative of the angle on gravity and on the pivot's acceleration.
-
-    th'' = -w0^2 sin th - (a_vertical / l) sin th + (-a_lateral / l) cos th: both coefficients are
-    negative if upward and toward positive theta are positive.
-    """
+def drive_sign(work: Work) -> Finding | None:
+    """Report a drive or pivot whose coefficient the angle shows with the wrong sign."""
     from scipy.signal import savgol_filter
 
     interval, even = even_times(work.time)
     count, good = even.size, work.trusted
     if count < 100 or not good.any():
-        return
+        return None
     theta = np.interp(even, work.time[good], work.theta[good])
     w0 = work.known.get("w0") or 6.0
     window = max(round(DERIVATIVE_SPAN * 2 * math.pi / w0 / interval), 5) | 1
     if window > count // 4:
-        return
+        return None
 
     smooth = functools.partial(savgol_filter, window_length=window, polyorder=3, delta=interval)
     pushes = _pushes(work, even, smooth)
@@ -125,7 +97,7 @@ def _drive_sign(work: Work) -> None:
     columns = [smooth(push * arms[name](theta)) for name, push in pushes.items()]
     table = np.column_stack([smooth(np.sin(theta)), *columns])
     if not pushes or np.linalg.matrix_rank(table) < table.shape[1]:
-        return
+        return None
     target = smooth(theta, deriv=2)
     answer = np.linalg.lstsq(table, target, rcond=None)[0]
     rest = target - table @ answer
@@ -133,22 +105,21 @@ def _drive_sign(work: Work) -> None:
     variance = float(np.sum(rest**2)) / count * (count / worth)
     errors = np.sqrt(np.maximum(np.diag(np.linalg.pinv(table.T @ table)) * variance, 1e-300))
     if answer[0] > 0:
-        return  # no oscillation about theta = 0: the sign is undetermined
+        return None  # no oscillation about theta = 0: the sign is undetermined
     for name, value, error in zip(pushes, answer[1:], errors[1:], strict=True):
         if value > CERTAIN_SIGN * error:
-            said = "the drive" if name == "drive" else f"the pivot's {name} acceleration"
-            text = f"by the angle, {said} acts with the opposite sign: turned by 180 degrees?"
-            text += "" if name == "drive" else " sign = -1 in pivot reverses it"
-            work.report("sign-turned", text)
+            key = "sign-turned.drive" if name == "drive" else "sign-turned.pivot"
+            return work.finding(key, way=name)
+    return None
 
 
 def _pushes(work: Work, even: Floats, smooth: Callable[..., Floats]) -> dict[str, Floats]:
     """Return the accelerations of the pivot, or a(t) of the drive, at equally spaced times."""
-    found: dict[str, Floats] = {}
+    pushes: dict[str, Floats] = {}
     drive = work.plan.drive or {}
     p, phi = drive.get("p"), drive.get("phi")
     if p and phi is not None:
-        found["drive"] = p * np.cos((drive["Omega"] or 0.0) * even + phi)
+        pushes["drive"] = p * np.cos((drive["Omega"] or 0.0) * even + phi)
     order = PIVOT_ORDER.get(work.pivot_unit or "", 0)
     for way, values in work.pivot.items():
         good = np.isfinite(values)
@@ -156,166 +127,26 @@ def _pushes(work: Work, even: Floats, smooth: Callable[..., Floats]) -> dict[str
             continue
         if np.max(np.abs(values[good])) < 1e6:
             motion = np.interp(even, work.time[good], values[good])
-            found[way] = smooth(motion, deriv=order) if order else motion
-    return found
+            pushes[way] = smooth(motion, deriv=order) if order else motion
+    return pushes
 
 
-@dataclasses.dataclass(frozen=True)
-class _Motion:
-    """Smoothed angle, derivatives and measured acceleration at the samples that have all."""
-
-    theta: Floats
-    velocity: Floats
-    acceleration: Floats
-    measured: Floats
-    w0: float
-
-    def expected(self, sensor: Accelerometer) -> Floats:
-        """Return the accelerometer readings predicted from the angle."""
-        r, g = sensor.distance_m, sensor.gravity
-        if sensor.direction == "radial":
-            return np.asarray(r * self.velocity**2 + g * np.cos(self.theta))
-        return np.asarray(r * self.acceleration + g * np.sin(self.theta))
-
-
-def _acceleration(work: Work) -> None:
-    """Compare an acceleration with the angle; invert it if it has the opposite sign."""
-    if work.angle_source is not None:
-        return
-    forced = work.plan.kind == "forced"
-    motion = None if forced else _motion(work)
-    if motion is None:
-        why = "too few samples have an angle to compare it with"
-        if forced:
-            why = "on a forced run it includes the pivot's"
-        work.report("acceleration-unused", f"the acceleration is not used: {why}")
-    elif work.accelerometer is None:
-        _unplaced(work, motion)
-    else:
-        _compared(work, motion, work.accelerometer)
-
-
-def _motion(work: Work) -> _Motion | None:
-    """Return derivatives of the angle from local polynomials; None if they are unreliable."""
-    from scipy.signal import savgol_filter
-
-    measured = work.extra["acceleration"]
-    good = work.trusted & np.isfinite(measured)
-    interval, even = even_times(work.time)
-    count = even.size
-    if np.count_nonzero(good) < 100 or not count:
+def acceleration(work: Work) -> Finding | None:
+    """Report an acceleration that is not used, since there is an angle."""
+    if work.angle_source is not None or "acceleration" not in work.extra:
         return None
-    theta = np.interp(even, work.time[good], work.theta[good])
-    seen = np.interp(even, work.time[good], measured[good])
-    inside = np.interp(even, work.time, good.astype(float)) > 0.99
-    crossings = np.count_nonzero(np.diff(np.sign(theta[inside] - np.median(theta[inside]))))
-    if crossings < 4:
-        return None
-    # Noise adds crossings of the median: this is a lower bound of the period.
-    period = 2 * float(np.count_nonzero(inside)) * interval / crossings
-    window = max(round(DERIVATIVE_SPAN * period / interval), 5) | 1
-    if window > count // 4:
-        return None
-    zeroth, first, second = (
-        np.asarray(savgol_filter(theta, window, 4, deriv=k, delta=interval)) for k in range(3)
-    )
-    smoothed = np.asarray(savgol_filter(seen, window, 4))
-    inside[: window // 2] = inside[count - window // 2 :] = False
-    sine = np.sin(zeroth[inside])
-    slope = _slope(sine, second[inside])
-    if slope >= 0:
-        return None
-    w0 = math.sqrt(-slope)
-    return _Motion(zeroth[inside], first[inside], second[inside], smoothed[inside], w0)
+    return work.finding("acceleration-unused")
 
 
-def _slope(x: Floats, y: Floats) -> float:
-    """Return the slope of the least-squares line through points."""
-    x = x - np.mean(x)
-    power = float(np.dot(x, x))
-    return float(np.dot(x, y - np.mean(y))) / power if power else 0.0
-
-
-def _alike(one: Floats, other: Floats) -> float:
-    """Return the correlation of two channels; 0 if one is constant."""
-    if float(np.std(one)) == 0 or float(np.std(other)) == 0:
-        return 0.0
-    return float(np.corrcoef(one, other)[0, 1])
-
-
-def _compared(work: Work, motion: _Motion, sensor: Accelerometer) -> None:
-    """Report the agreement of an acceleration with the readings predicted at its position."""
-    expected = motion.expected(sensor)
-    alike, gain = _alike(expected, motion.measured), _slope(expected, motion.measured)
-    angular = sensor.direction == "angular"
-    where = "" if angular else f", {sensor.direction} at {sensor.distance_m:g} m"
-    if abs(alike) < SAME_MOTION:
-        text = (
-            f"the acceleration is not used: it does not follow the angle (correlation {alike:.2f}"
-            f"{where}): direction or column is wrong, or its noise hides the swing"
-        )
-        work.report("acceleration-unlike", text)
-        return
-    if gain < 0:
-        _turn(work, "acceleration")
-    text = f"the acceleration is {abs(gain):.3g} times that computed from the angle{where}"
-    if abs(abs(gain) - 1) <= GAIN_OFF:
-        work.report("acceleration-agrees", f"{text}: {CHECK_ONLY}")
-        return
-    other = "its unit, or a distance"
-    if not angular:
-        distance = _distance(motion, math.copysign(1.0, alike), sensor)
-        other = (
-            f"distance_m would be {distance:.3g}, or unit" if distance > 0 else "unit, distance_m"
-        )
-        other += " or gravity_removed is wrong"
-    work.report("acceleration-scale", f"{text}: {other}; not used")
-
-
-def _distance(motion: _Motion, sign: float, sensor: Accelerometer) -> float:
-    """Return the estimated distance of a sensor from the pivot, m, of known direction."""
-    measured = sign * motion.measured
-    if sensor.direction == "radial":
-        return _slope(motion.velocity**2, measured - sensor.gravity * np.cos(motion.theta))
-    return (sensor.gravity - _slope(np.sin(motion.theta), measured)) / motion.w0**2
-
-
-def _unplaced(work: Work, motion: _Motion) -> None:
-    """Report the estimated direction and distance of an accelerometer of unknown position."""
-    gravity = float(work.known.get("gravity", GRAVITY))
-    sine = _alike(np.sin(motion.theta), motion.measured)
-    radial = _alike(motion.velocity**2, motion.measured)
-    if max(abs(sine), abs(radial)) < SAME_MOTION:
-        text = "the acceleration is not used: it follows neither the angle nor the velocity squared"
-        work.report("acceleration-unlike", text)
-        return
-    if abs(radial) > abs(sine):
-        sign = math.copysign(1.0, radial)
-        distance = _distance(motion, sign, Accelerometer("radial", 1.0, gravity))
-        without = _distance(motion, sign, Accelerometer("radial", 1.0, 0.0))
-        said = f'"radial", with distance_m {distance:.3g}, or {without:.3g} if gravity is removed'
-    else:
-        gain = abs(_slope(np.sin(motion.theta), motion.measured))
-        near, far = (abs(gravity - s * gain) / motion.w0**2 for s in (1, -1))
-        without = gain / motion.w0**2
-        near_too = f"{near:.3g} or " if gain < gravity else ""
-        said = (
-            f'"tangential", with distance_m {near_too}{far:.3g} by the sense of its axis, or'
-            f" {without:.3g} if gravity is removed"
-        )
-    use = f"{work.place_missing} in [columns] would make it {CHECK_ONLY}"
-    work.report("acceleration-unused", f"the acceleration looks {said}; {use}")
-
-
-def smooth_pivot(work: Work) -> None:
+def pivot_steps(work: Work) -> Finding | None:
     """Replace stepwise positions or velocities of the pivot by smooth accelerations."""
     order = PIVOT_ORDER.get(work.pivot_unit or "", 0)
     known = all(np.isfinite(values).all() for values in work.pivot.values())
     if not order or work.time.size < 20 or not known:
-        return
+        return None
     interval, even = even_times(work.time)
     if not even.size:
-        return
+        return None
     places = {way: np.interp(even, work.time, values) for way, values in work.pivot.items()}
     windows = [
         _cubic_window(places[way], step_of(values), order, interval)
@@ -323,19 +154,17 @@ def smooth_pivot(work: Work) -> None:
         if np.ptp(values) > 0
     ]
     if not windows or max(windows) < 7:
-        return
+        return None
     from scipy.signal import savgol_filter
 
     for way, values in places.items():
         pushed = savgol_filter(values, max(windows), 3, deriv=order, delta=interval)
         work.pivot[way] = np.interp(work.time, even, pushed)
     what = "places" if order == 2 else "speeds"
-    text = (
-        f"the pivot's {what} come in steps: its acceleration is that of cubics through"
-        f" {max(windows)} readings, {max(windows) * interval:.3g} s"
-    )
-    work.report("pivot-smoothed", text, mended=True)
     work.pivot_unit = "m/s2"
+    longest = max(windows)
+    seconds = longest * interval
+    return work.finding("pivot-smoothed", what=what, readings=longest, seconds=seconds)
 
 
 def _cubic_window(values: Floats, step: float, order: int, interval: float) -> int:

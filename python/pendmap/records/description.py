@@ -149,7 +149,7 @@ def _checked(where: str, value: object, checks: Checks, example: str = "") -> di
     """Return the checked values of a table, in which each key has a check."""
     table = _table(where, value, example)
     _refuse_unknown(table, checks, where)
-    return {key: checks[key](f"{where}: {key}", each) for key, each in table.items()}
+    return {key: checks[key](f"{where}: {key}", given) for key, given in table.items()}
 
 
 def _number(name: str, value: object) -> float:

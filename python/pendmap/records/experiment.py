@@ -155,7 +155,7 @@ class Run:
     @property
     def copied(self) -> bool:
         """Whether the readings are duplicates of another run's, which includes them."""
-        return not self.moves and any(found.what == "same-record" for found in self.findings)
+        return not self.moves and any(finding.what == "same-record" for finding in self.findings)
 
     @property
     def rod_sensor(self) -> Accelerometer | Gyroscope | None:
@@ -204,7 +204,7 @@ class Experiment:
     def w0(self) -> float | None:
         """``w0`` of ``[rig]``, rad/s; None if not given or inconsistent with a record's period."""
         doubtful = any(
-            found.what == "period-unlike-rig" for _, found in self.findings_of(self.runs)
+            finding.what == "period-unlike-rig" for _, finding in self.findings_of(self.runs)
         )
         return None if doubtful or "w0" not in self.known else float(self.known["w0"])
 
@@ -217,11 +217,12 @@ class Experiment:
         """Raise InputError if none of the runs has samples for fitting."""
         if any(run.moves for run in runs):
             return
-        whys = (found.text for _, found in self.findings_of(runs) if found.what in NOTHING_TO_FIT)
+        pairs = self.findings_of(runs)
+        whys = (finding.text for _, finding in pairs if finding.what in NOTHING_TO_FIT)
         why = next(whys, "no sample is trusted")
         raise InputError(f"{self.path}: must be a record of a motion, got nothing to fit: {why}")
 
     def findings_of(self, runs: Iterable[Run]) -> Iterator[tuple[str, Finding]]:
         """Yield the findings about the experiment and some runs, with their places."""
-        yield from ((str(self.path), found) for found in self.findings)
-        yield from ((run.name, found) for run in runs for found in run.findings)
+        yield from ((str(self.path), finding) for finding in self.findings)
+        yield from ((run.name, finding) for run in runs for finding in run.findings)

@@ -53,11 +53,7 @@ DECAYED: Final = 0.05  # Amplitude, over the largest, below which a motion has d
 
 
 def angle_from(work: Work, accelerometer: Accelerometer) -> str:
-    """Compute the angle from an acceleration; return a text on its uncertainty, or "".
-
-    Raises InputError if the readings are inconsistent with a swing at this position: too few half
-    swings, all on one side, too large, over the top, or at the centre of oscillation.
-    """
+    """Compute the angle from an acceleration; return a doubt; InputError if it is no swing."""
     time, reading, where = work.time, work.extra["acceleration"], work.where
     noise = noise_of(time, reading).sigma
     noise = noise if math.isfinite(noise) else 0.0
@@ -68,32 +64,32 @@ def angle_from(work: Work, accelerometer: Accelerometer) -> str:
     swung = np.concatenate([reading[a:b] for a, b in free])
     _refuse_radial(swung, middle, accelerometer, where)
     values = reading - middle
-    each = [waves_of(time, values, part, noise) for part in free]
-    waves = [wave for part in each for wave in part]
+    by_swing = [waves_of(time, values, part, noise) for part in free]
+    waves = [wave for part in by_swing for wave in part]
     if len(waves) < FEWEST_HALF_SWINGS:
         raise InputError(
             f"{where}: the acceleration must show {FEWEST_HALF_SWINGS} half swings or more if"
             f" there is no angle, got {len(waves)}"
         )
-    found = dataclasses.replace(accelerometer, w0=_frequency(waves, accelerometer))
+    sensor = dataclasses.replace(accelerometer, w0=_frequency(waves, accelerometer))
     largest = max(wave.top for wave in waves)
     signal = largest / noise if noise else math.inf
     weak = signal < 4 * LEAST_SWING
-    doubt = _refuse_blind(found, waves, where, weak=weak)
-    _refuse_large(each, found, where)
+    doubt = _refuse_blind(sensor, waves, where, weak=weak)
+    _refuse_large(by_swing, sensor, where)
     for low, high in held:
         level = abs(float(np.median(values[low:high])))
-        if found.gravity and level > LARGEST_READING * found.gravity:
+        if sensor.gravity and level > LARGEST_READING * sensor.gravity:
             raise InputError(
-                f"{where}: the acceleration is {level:.3g} {found.unit} while the pendulum is"
-                f" held, and gravity gives at most {found.gravity:.3g}: unit is wrong"
+                f"{where}: the acceleration is {level:.3g} {sensor.unit} while the pendulum is"
+                f" held, and gravity gives at most {sensor.gravity:.3g}: unit is wrong"
             )
     if weak:
         doubt = f"the largest reading is {signal:.2g} times the noise{doubt and f'; {doubt}'}"
-    work.theta, work.accelerometer = _unfolded(values, each, free, found, noise), found
+    work.theta, work.accelerometer = _unfolded(values, by_swing, free, sensor, noise), sensor
     for low, high in held:
         # A held pendulum has no acceleration: the sensor reads gravity, or nothing.
-        pull = values[low:high] / found.gravity if found.gravity else np.zeros(high - low)
+        pull = values[low:high] / sensor.gravity if sensor.gravity else np.zeros(high - low)
         work.theta[low:high] = np.arcsin(np.clip(pull, -1, 1))
     return doubt
 
@@ -161,9 +157,9 @@ def _refuse_blind(sensor: Accelerometer, waves: list[Wave], where: str, *, weak:
     )
 
 
-def _refuse_large(each: list[list[Wave]], sensor: Accelerometer, where: str) -> None:
+def _refuse_large(by_swing: list[list[Wave]], sensor: Accelerometer, where: str) -> None:
     """Raise InputError for readings larger than those of any swing, and for rotations."""
-    top = float(np.quantile([wave.top for waves in each for wave in waves], 0.8))
+    top = float(np.quantile([wave.top for waves in by_swing for wave in waves], 0.8))
     most = abs(sensor.gain)
     if top > LARGEST_READING * most:
         place = ""
@@ -174,7 +170,7 @@ def _refuse_large(each: list[list[Wave]], sensor: Accelerometer, where: str) -> 
             f"{where}: the acceleration reaches {top:.3g} {sensor.unit}, and a swing of this period"
             f" at most {most:.3g}{place}: unit, distance_m, direction or gravity_removed is wrong"
         )
-    for waves in each:
+    for waves in by_swing:
         folds = [k for k, wave in enumerate(waves) if wave.dip > CERTAIN_DIP]
         before = waves[: folds[-1]] if folds else []
         if any(not wave.folded(most) and wave.top > 0.9 * most for wave in before):
@@ -186,7 +182,7 @@ def _refuse_large(each: list[list[Wave]], sensor: Accelerometer, where: str) -> 
 
 def _unfolded(
     values: Floats,
-    each: list[list[Wave]],
+    by_swing: list[list[Wave]],
     free: list[Stretch],
     sensor: Accelerometer,
     noise: float,
@@ -194,7 +190,7 @@ def _unfolded(
     """Return the angle of each sample of free swings, rad."""
     most, sense = abs(sensor.gain), math.copysign(1.0, sensor.gain)
     theta = np.arcsin(np.clip(values / most, -1, 1)) * sense
-    for (begin, _), whole in zip(free, each, strict=True):
+    for (begin, _), whole in zip(free, by_swing, strict=True):
         waves = list(whole)
         if waves and waves[0].low > begin + 2:
             # Readings of a swing released beyond a quarter turn begin in a dip.
@@ -236,9 +232,9 @@ class Wave:
 def waves_of(time: Floats, values: Floats, part: Stretch, noise: float) -> list[Wave]:
     """Return the half swings of a free stretch between crossings of the middle."""
     stretch = slice(*part)
-    found = swings(time[stretch], values[stretch], least=max(LEAST_SWING * noise, 1e-12))
+    half = swings(time[stretch], values[stretch], least=max(LEAST_SWING * noise, 1e-12))
     waves = []
-    for start, end in zip(found.crossing[:-1], found.crossing[1:], strict=True):
+    for start, end in zip(half.crossing[:-1], half.crossing[1:], strict=True):
         low, high = (part[0] + int(k) for k in np.searchsorted(time[stretch], (start, end)))
         if high - low >= 3:
             waves.append(wave_of(values, low, high, noise, end - start))
@@ -331,13 +327,13 @@ def _quiet(time: Floats, reading: Floats, period: float, noise: float) -> list[S
     still |= _all_of(square - away**2 <= (STILL_SCATTER * noise) ** 2, short)
     away, square = (uniform_filter1d(x, width) for x in (values, values**2))
     limits = np.where(np.abs(away) > LEAST_SWING * noise, (STEADY_HOLD * away) ** 2, -1.0)
-    found = []
+    holds = []
     for low, high in stretches(still | _all_of(square - away**2 <= limits, width)):
         # Without trembling, the release is located to a sample.
         sure = low + np.flatnonzero(still[low:high]) + 1
         exact = sure.size and sure[-1] > high - width // 2
-        found.append((low, int(sure[-1]) if exact else high))
-    return found
+        holds.append((low, int(sure[-1]) if exact else high))
+    return holds
 
 
 def constant(values: Floats, width: int, limit: float) -> Mask:
@@ -370,12 +366,9 @@ def release_after_hold(time: Floats, values: Floats, noise: float) -> int:
 
 
 def _untouched(time: Floats, values: Floats, least: float, small: float, *, more: bool) -> int:
-    """Return the end (exclusive) of a free swing, at which a hand may take the pendulum.
-
-    ``more`` is true if a quiet stretch follows.
-    """
-    found = swings(time, values, least=least)
-    halves, tops = np.diff(found.crossing), np.abs(found.peak)
+    """Return the end (exclusive) of a free swing; ``more`` if a quiet stretch follows."""
+    half = swings(time, values, least=least)
+    halves, tops = np.diff(half.crossing), np.abs(half.peak)
     slack = least if math.isfinite(least) else 0.0  # the noise of few samples is not known
 
     def follows(k: int) -> bool:
@@ -389,9 +382,9 @@ def _untouched(time: Floats, values: Floats, least: float, small: float, *, more
         last -= 1
     if last < 2 or tops[last] < max(small, 3 * least):
         return time.size  # it decays to rest
-    tail = values[int(np.searchsorted(time, found.crossing[-1])) :]
+    tail = values[int(np.searchsorted(time, half.crossing[-1])) :]
     grown = np.max(np.abs(tail), initial=0.0) > tops[last - 1] * GROWTH + least
-    whole = time[-1] - found.crossing[-1] < (1 + UNEVEN) * halves[last - 1]
+    whole = time[-1] - half.crossing[-1] < (1 + UNEVEN) * halves[last - 1]
     if whole and last == tops.size - 1 and not more and not grown:
         return time.size
-    return int(np.searchsorted(time, found.crossing[last + 1]))
+    return int(np.searchsorted(time, half.crossing[last + 1]))

@@ -53,10 +53,7 @@ class SpeedLaw:
         return np.hypot(self.still, self.tau * speed_of(time, theta, self.fastest))
 
     def shift(self, time: Floats, theta: Floats) -> Floats:
-        """Return the bias of readings by jitter, rad, shape (N,).
-
-        ``E theta(t + d) - theta(t) = tau^2 theta'' / 2``: jitter reduces apparent amplitudes.
-        """
+        """Return the bias of readings by jitter, ``tau^2 theta'' / 2``, rad, shape (N,)."""
         calm = _calm(theta)
         lag = _lag(time, BEND_REACH / self.fastest)
         if time.size <= 2 * lag:
@@ -109,26 +106,19 @@ def _lag(time: Floats, seconds: float) -> int:
 def law_of(
     fit: LocalFit, square: Floats, *, fastest: float, count: float = 0.0, interval: float = 0.0
 ) -> SpeedLaw | None:
-    """Return the growth of a fit's noise with speed; None if it is not significant.
-
-    ``square`` is the squared speed of each residual, (rad/s)^2.
-    """
-    found = _adapted(fit.residual, square, fit.sum_of_squares, count)
-    if found is not None and count and found[0] < DITHERED * count:
+    """Return the growth of noise with squared speed, (rad/s)^2; None if not significant."""
+    law = _adapted(fit.residual, square, fit.sum_of_squares, count)
+    if law is not None and count and law[0] < DITHERED * count:
         # Slow readings that share a count have a common error, absent from residuals.
         quick = square >= (count / interval) ** 2
-        found = _adapted(fit.residual[quick], square[quick], fit.sum_of_squares, count)
-    return None if found is None else SpeedLaw(*found, fastest)
+        law = _adapted(fit.residual[quick], square[quick], fit.sum_of_squares, count)
+    return None if law is None else SpeedLaw(*law, fastest)
 
 
 def _adapted(
     residual: Floats, square: Floats, worth: float, count: float
 ) -> tuple[float, float, float] | None:
-    """Return ``still``, ``tau`` and its standard error; None if tau is not significant.
-
-    Fits ``E r^2 = a + b v^2`` by iteratively reweighted least squares, weights
-    ``1 / (a + b v^2)^2``.
-    """
+    """Return still, tau and its error by weighted fits of ``E r^2 = a + b v^2``, or None."""
     if residual.size < FEWEST_RESIDUALS:
         return None
     power = residual**2

@@ -1,4 +1,4 @@
-"""Segmentation of a free record: held, swinging, at rest, handled between releases."""
+"""Rules that segment a free record: held, swinging, at rest, handled between releases."""
 
 from __future__ import annotations
 
@@ -10,19 +10,18 @@ import numpy as np
 
 from pendmap.errors import InputError
 from pendmap.formatting import counted, listed, moment
-from pendmap.records import trigger
 from pendmap.records.experiment import Segment
 from pendmap.records.from_acceleration import STILL_SPAN, constant, release_after_hold, swinging
 from pendmap.records.noise import noise_of
+from pendmap.records.periods import middle_of, periods_of
 from pendmap.records.releases import enough, grown, held_short, releases
 from pendmap.records.rod_sensors import gyroscope_of
-from pendmap.records.scale import middle_of, periods_of
 from pendmap.signal.half_cycles import after_turns, swings
 from pendmap.signal.local_polynomial import local_fit
 from pendmap.signal.robust import between, normal_scale, stretches
 
 if TYPE_CHECKING:
-    from pendmap.records.rod_sensors import Accelerometer
+    from pendmap.records.experiment import Finding
     from pendmap.records.work import Work
     from pendmap.signal import Stretch
 
@@ -31,8 +30,8 @@ MOST_LISTED: Final = 6  # Most releases whose times are listed in a message
 CERTAIN_OFFSET: Final = 4.0  # Standard errors above which an offset is reported
 
 
-def moves(work: Work) -> bool:
-    """Return whether the pendulum moves; report rest; InputError for a constant angle."""
+def moves(work: Work) -> Finding | None:
+    """Find whether the pendulum moves; report rest; InputError for a constant angle."""
     low, high = float(work.time[0]), float(work.time[-1])
     work.segments = [Segment("motion", low, high, used=True)]
     if np.ptp(work.theta) == 0:
@@ -41,12 +40,12 @@ def moves(work: Work) -> bool:
     good = work.theta[work.trusted]
     spread = float(np.ptp(good)) if good.size else 0.0
     still = good.size < 4 or (work.noise > 0.7 * float(np.std(good)) and spread < NOISE_SPAN)
-    if not still and spread > work.limit:
-        return True
-    work.report("no-motion", f"nothing moves: all angles within {spread:.3g} rad")
+    work.moves = not still and spread > work.limit
+    if work.moves:
+        return None
     work.segments = [Segment("rest", low, high, used=False)]
     work.trusted[:] = False
-    return False
+    return work.finding("no-motion", extent=spread)
 
 
 def _measure_noise(work: Work) -> None:
@@ -63,60 +62,61 @@ def _measure_noise(work: Work) -> None:
     work.limit = min(reach, max(STILL_SPAN * work.noise, 2.5 * work.count))
 
 
-def check(work: Work) -> None:
-    """Divide a free record into segments and trust those of free swings."""
-    if work.plan.kind != "free":
-        return
+def free_motions(work: Work) -> Finding | None:
+    """Find the free motions of a record, and the period of small swings."""
+    if not work.free:
+        return None
     # An angle computed from an acceleration is folded: its readings over the gain are used.
-    told = work if work.angle_source is None else _with_readings(work, work.angle_source)
-    _measure_noise(told)
-    good = told.theta[told.trusted]
-    middle = middle_of(told.time[told.trusted], good)
-    told.middle = float(np.median(good)) if middle is None else middle
-    ends = np.flatnonzero(work.trusted)
-    span = (int(ends[0]), int(ends[-1]) + 1)
-    period = _period(work, told.middle)
+    read = _readings(work)
+    good = read.theta[read.trusted]
+    middle = middle_of(read.time[read.trusted], good)
+    read.middle = float(np.median(good)) if middle is None else middle
+    period = _period(work, read.middle)
     if period is None:
-        work.report("no-swing", "too few whole swings: little can be checked")
-        return
-    work.period, work.middle = period, told.middle
+        return work.finding("no-swing")
+    work.period, work.middle = period, read.middle
+    span = _trusted_span(work)
     if work.angle_source is not None:
-        parts = _free_swings(told, span)
-    else:
-        parts = [(a, b) for a, b in between(_still(work, span), *span) if b - a > 5]
-        parts = releases(work, parts)
-        held = held_short(work, parts[0]) if parts else None
-        if held is not None:
-            parts[0] = (held, parts[0][1])
-    if not parts:
-        return
-    parts = trigger.after_edges(work, parts, period)
-    used = [enough(told, part) for part in parts]
-    if not any(used):
-        longest = max(range(len(parts)), key=lambda k: parts[k][1] - parts[k][0])
-        used[longest] = True
-    work.releases = [part for part, use in zip(parts, used, strict=True) if use]
-    _settle(work, parts, used, span)
+        work.parts = _free_swings(read, span)
+        return None
+    parts = [(a, b) for a, b in between(_still(work, span), *span) if b - a > 5]
+    work.parts = releases(work, parts)
+    begin = held_short(work, work.parts[0]) if work.parts else None
+    if begin is not None:
+        work.parts[0] = (begin, work.parts[0][1])
+    return None
 
 
-def _with_readings(work: Work, sensor: Accelerometer) -> Work:
-    """Return a record with accelerometer readings over the gain in place of the angle."""
+def _trusted_span(work: Work) -> Stretch:
+    """Return the range of the trusted samples."""
+    good = np.flatnonzero(work.trusted)
+    return int(good[0]), int(good[-1]) + 1
+
+
+def _readings(work: Work) -> Work:
+    """Return a record with accelerometer readings over the gain in place of their angle."""
+    sensor = work.angle_source
+    if sensor is None:
+        _measure_noise(work)
+        return work
     readings = work.extra["acceleration"].copy()
     bad = ~work.trusted
     readings[bad] = np.interp(work.time[bad], work.time[~bad], readings[~bad])
-    return dataclasses.replace(work, theta=readings / sensor.gain)
+    read = dataclasses.replace(work, theta=readings / sensor.gain)
+    _measure_noise(read)
+    return read
 
 
-def _free_swings(told: Work, span: Stretch) -> list[Stretch]:
+def _free_swings(read: Work, span: Stretch) -> list[Stretch]:
     """Return the stretches of free swings in accelerometer readings."""
-    time, readings = told.time[slice(*span)], told.theta[slice(*span)]
+    time, readings = read.time[slice(*span)], read.theta[slice(*span)]
     noise = noise_of(time, readings).sigma
     free, _ = swinging(time, readings, noise)
-    pieces = [piece for low, high in free for piece in grown(told, (span[0] + low, span[0] + high))]
+    pieces = [piece for low, high in free for piece in grown(read, (span[0] + low, span[0] + high))]
     return [
         (
             low
-            + release_after_hold(told.time[low:high], told.theta[low:high] - told.middle, noise),
+            + release_after_hold(read.time[low:high], read.theta[low:high] - read.middle, noise),
             high,
         )
         for low, high in pieces
@@ -127,8 +127,10 @@ def _period(work: Work, middle: float) -> float | None:
     """Return the approximate period of small swings, s."""
     if work.angle_source is not None:
         return 2 * math.pi / work.angle_source.w0
-    if (found := periods_of(work, middle)) is not None:
-        return found.small
+    good = work.trusted
+    periods = periods_of(work.time[good], work.theta[good] - middle, work.count)
+    if periods is not None:
+        return periods.small
     w0 = work.known.get("w0")
     if not w0 and "gravity" in work.known and "length_m" in work.known:
         w0 = math.sqrt(work.known["gravity"] / work.known["length_m"])
@@ -143,16 +145,29 @@ def _still(work: Work, span: Stretch) -> list[Stretch]:
     width = max(round(work.period / float(np.median(np.diff(work.time)))), 5) | 1
     if width >= theta.size:
         return []
-    found = stretches(constant(theta, width, work.limit))
-    return [(span[0] + a, span[0] + b) for a, b in found]
+    still = stretches(constant(theta, width, work.limit))
+    return [(span[0] + a, span[0] + b) for a, b in still]
 
 
-def _settle(work: Work, parts: list[Stretch], used: list[bool], span: Stretch) -> None:
-    """Set the segments, trust the used releases, and report both."""
+def used_motions(work: Work) -> Finding | None:
+    """Trust the free motions that are long enough, and set the segments."""
+    if not work.parts:
+        return None
+    read, span = _readings(work), _trusted_span(work)
+    used = [enough(read, part) for part in work.parts]
+    if not any(used):
+        used[max(range(len(used)), key=lambda k: work.parts[k][1] - work.parts[k][0])] = True
+    work.releases = [part for part, use in zip(work.parts, used, strict=True) if use]
+    _settle(work, used, span)
+    return _releases(work, used) if len(used) > 1 else None
+
+
+def _settle(work: Work, used: list[bool], span: Stretch) -> None:
+    """Set the segments, and trust the used motions."""
     trusted = np.zeros(work.time.size, bool)
-    beside = between(parts, *span)
+    beside = between(work.parts, *span)
     segments = [] if not span[0] else [_segment(work, "motion", (0, span[0]), used=False)]
-    for k, (part, use) in enumerate(zip(parts, used, strict=True)):
+    for k, (part, use) in enumerate(zip(work.parts, used, strict=True)):
         segments += _between(work, beside[k], first=k == 0)
         segments.append(_segment(work, "motion", part, used=use))
         trusted[slice(*part)] = use
@@ -161,30 +176,23 @@ def _settle(work: Work, parts: list[Stretch], used: list[bool], span: Stretch) -
         segments.append(_segment(work, "motion", (span[1], work.time.size), used=False))
     work.segments = segments
     work.trusted &= trusted
-    if len(parts) > 1:
-        _say_releases(work, parts, used)
-    first, last = segments[0], segments[-1]
-    if first.what == "held":
-        begin = moment(segments[1].from_s)
-        text = f"held at first: used from {begin} s, where the angle has clearly left the hold"
-        work.report("held-start", text, span=(first.from_s, first.to_s))
-    if last.what == "rest" and len(segments) > 1:
-        text = f"at rest from {moment(last.from_s)} s, not for fitting"
-        work.report("rest-tail", text, span=(last.from_s, last.to_s))
 
 
-def _say_releases(work: Work, parts: list[Stretch], used: list[bool]) -> None:
-    """Report the releases that are used and those that are too short."""
-    spans = [f"{moment(work.time[a])} to {moment(work.time[b - 1])} s" for a, b in parts]
+def _releases(work: Work, used: list[bool]) -> Finding:
+    """Return the finding about the releases that are used and those that are too short."""
+    spans = [f"{moment(work.time[a])} to {moment(work.time[b - 1])} s" for a, b in work.parts]
     taken = [span for span, use in zip(spans, used, strict=True) if use]
     short = [span for span, use in zip(spans, used, strict=True) if not use]
-    each = "each taken as a run" if len(taken) > 1 else "one is used"
+    what = "each taken as a run" if len(taken) > 1 else "one is used"
     # The times are those of the used samples; ends of holds are estimated conservatively.
-    text = f"{counted(len(parts), 'release')}, used from {listed(taken, MOST_LISTED)}: {each}"
+    number, used_from, less = counted(len(spans), "release"), listed(taken, MOST_LISTED), ""
     if short:
-        text += f"; {len(short)} of fewer than three swings left out: {listed(short, MOST_LISTED)}"
+        less = f"; {len(short)} of fewer than three swings left out: {listed(short, MOST_LISTED)}"
     low, high = work.releases[0][0], work.releases[-1][1] - 1
-    work.report("several-releases", text, span=(float(work.time[low]), float(work.time[high])))
+    span = float(work.time[low]), float(work.time[high])
+    return work.finding(
+        "several-releases", span=span, releases=number, used=used_from, what=what, short=less
+    )
 
 
 def _between(work: Work, part: Stretch, *, first: bool) -> list[Segment]:
@@ -204,16 +212,33 @@ def _segment(work: Work, what: str, part: Stretch, *, used: bool) -> Segment:
     return Segment(what, float(work.time[part[0]]), float(work.time[part[1] - 1]), used)
 
 
-def check_zero(work: Work) -> None:
+def held_at_first(work: Work) -> Finding | None:
+    """Report a hold before the first motion."""
+    first = work.segments[0]
+    if first.what != "held":
+        return None
+    begin = moment(work.segments[1].from_s)
+    return work.finding("held-start", span=(first.from_s, first.to_s), begin=begin)
+
+
+def rest_at_last(work: Work) -> Finding | None:
+    """Report a rest after the last motion."""
+    last = work.segments[-1]
+    if last.what != "rest" or len(work.segments) == 1:
+        return None
+    return work.finding("rest-tail", span=(last.from_s, last.to_s), begin=moment(last.from_s))
+
+
+def zero(work: Work) -> Finding | None:
     """Report a rest angle, or middle of the swings, of a free run that is not 0."""
     if not work.releases or work.angle_source is not None or work.integrated:
-        return  # an angle from a sensor on the rod has its zero at the middle
+        return None  # an angle from a sensor on the rod has its zero at the middle
     last = work.segments[-1]
     if last.what == "rest":
         tail = work.theta[work.time >= last.from_s]
         value = float(np.mean(tail))
         error = max(float(np.std(tail)) / math.sqrt(tail.size), work.count / math.sqrt(12))
-        said = f"it rests at {_folded(value):+.3g} rad: an offset, or held there by friction"
+        finding = work.finding("zero-offset.rest", middle=_folded(value))
     else:
         _measure_noise(work)
         time, theta = work.time[work.trusted], work.theta[work.trusted]
@@ -223,15 +248,15 @@ def check_zero(work: Work) -> None:
         start = after_turns(theta)
         middles = swings(time[start:], theta[start:], least=work.limit).middle
         if middles.size < 6:
-            return
+            return None
         middles = middles[middles.size // 2 :]  # small swings: no asymmetry by friction, no turns
         value = float(np.median(middles))
         error = 1.6 * normal_scale(middles - value) / math.sqrt(middles.size)
         error = max(error, work.count / math.sqrt(12 * middles.size))
-        said = f"it swings about {value:+.3g} +- {error:.1g} rad: an offset of the zero"
-    known = any(finding.what == "zero-offset" for finding in work.findings)
-    if abs(_folded(value)) > max(CERTAIN_OFFSET * error, 1e-5) and not known:
-        work.report("zero-offset", f"{said}; left to the fit")
+        finding = work.finding("zero-offset.swing", middle=value, error=error)
+    known = any(other.what == "zero-offset" for other in work.findings)
+    small = abs(_folded(value)) <= max(CERTAIN_OFFSET * error, 1e-5)
+    return None if known or small else finding
 
 
 def _folded(angle: float) -> float:

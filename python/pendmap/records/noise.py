@@ -32,6 +32,7 @@ from pendmap.signal.robust import broad_scale, widened
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from pendmap.records.experiment import Finding
     from pendmap.records.work import Work
     from pendmap.signal import Floats, Mask
     from pendmap.signal.local_polynomial import LocalFit
@@ -137,9 +138,9 @@ def noise_floor(run: Run | Experiment) -> NoiseFloor:
         return NoiseFloor(math.nan, math.nan)
     trusted = run.trusted if run.trusted.any() else None
     if run.gyroscope is not None:
-        found = noise_of(run.time, run.read, trusted=trusted, count=step_of(run.read))
-        law = found.law and dataclasses.replace(found.law, grows_with="acceleration")
-        return dataclasses.replace(found, law=law)
+        noise = noise_of(run.time, run.read, trusted=trusted, count=step_of(run.read))
+        law = noise.law and dataclasses.replace(noise.law, grows_with="acceleration")
+        return dataclasses.replace(noise, law=law)
     return noise_of(run.time, run.theta, trusted=trusted, count=run.count_rad)
 
 
@@ -150,16 +151,12 @@ def noise_of(
     trusted: Mask | None = None,
     count: float = 0.0,
 ) -> NoiseFloor:
-    """Return the noise of readings, shape (N,), of any smooth motion.
-
-    Windows with untrusted samples are excluded unless too few remain. ``count`` is the resolution
-    of the readings, rad; 0 for none.
-    """
+    """Return the noise of readings of a smooth motion, of resolution ``count``, rad."""
     bad = np.zeros(time.size, bool) if trusted is None else ~trusted
-    found = _noise(time, theta, bad, count)
-    if found is None and bad.any():
-        found = _noise(time, theta, np.zeros(time.size, bool), count)
-    return found or NoiseFloor(math.nan, math.nan)
+    noise = _noise(time, theta, bad, count)
+    if noise is None and bad.any():
+        noise = _noise(time, theta, np.zeros(time.size, bool), count)
+    return noise or NoiseFloor(math.nan, math.nan)
 
 
 def _noise(time: Floats, theta: Floats, bad: Mask, count: float) -> NoiseFloor | None:
@@ -210,10 +207,7 @@ def _noise(time: Floats, theta: Floats, bad: Mask, count: float) -> NoiseFloor |
 
 
 def fastest(time: Floats, theta: Floats, count: float) -> tuple[float, float]:
-    """Return the largest phase velocities, rad/s.
-
-    The first treats large swings as rotations, whose curvature is similar; the second does not.
-    """
+    """Return the largest phase velocities, rad/s: with large swings as rotations, and as swings."""
     interval = float(np.median(np.diff(time)))
     lag = 1
     while True:
@@ -240,27 +234,28 @@ def _ranges(fit: LocalFit, least: float, slowest: float) -> list[SpeedRange]:
     speed = np.abs(fit.slope)
     number = max(min(SPEED_RANGES, fit.middle.size // FEWEST_RESIDUALS), 1)
     edges = np.quantile(speed, np.linspace(0, 1, number + 1))
-    found = []
+    ranges = []
     if slowest > 0:
-        found.append(SpeedRange(0.0, slowest, least, least / 10, 0))
+        ranges.append(SpeedRange(0.0, slowest, least, least / 10, 0))
         edges[0] = slowest
     for low, high in itertools.pairwise(edges.tolist()):
         part = fit.only((speed >= low) & (speed <= high))
         if part.middle.size:
             sigma = max(part.rms, least)
-            found.append(SpeedRange(low, high, sigma, part.stderr, part.middle.size))
-    return found
+            ranges.append(SpeedRange(low, high, sigma, part.stderr, part.middle.size))
+    return ranges
 
 
-def check(work: Work) -> None:
+def grows(work: Work) -> Finding | None:
     """Report noise that grows with speed."""
     if work.integrated:
-        return  # the noise by jitter of a rate grows with the acceleration
+        return None  # the noise by jitter of a rate grows with the acceleration
     count = 0.0 if work.edges else work.count
     law = noise_of(work.time, work.theta, trusted=work.trusted, count=count).law
-    if law is not None:
-        share = f"{100 * law.tau / float(np.median(np.diff(work.time))):.0f} %"
-        work.report("noise-grows-with-speed", f"{law} ({share} of the interval)")
+    if law is None:
+        return None
+    percent = 100 * law.tau / float(np.median(np.diff(work.time)))
+    return work.finding("noise-grows-with-speed", law=law, percent=percent)
 
 
 def clean(fit: LocalFit, bad: Mask, speed: Floats) -> LocalFit:
@@ -321,19 +316,19 @@ def fit_with_stride(
         stride = min(2 * stride, most)
     if np.count_nonzero(quick) < FEWEST_RESIDUALS:
         return None
-    found = [fit.only(quick)]
+    fits = [fit.only(quick)]
     farthest = max(int(STIFF_STRIDE * FARTHEST / (swing * interval)), 1)
     for longer in range(stride + 1, min(stride + MORE_STRIDES, farthest) + 1):
         degree, points = DEGREES[1] if fit is not nearest and longer <= most else DEGREES[-1]
         more = fitted(degree=degree, points=points, stride=longer)
-        found.append(more.only(np.abs(more.slope) >= slowest))
+        fits.append(more.only(np.abs(more.slope) >= slowest))
     middle, residual, slope = (
-        np.concatenate([getattr(each, name) for each in found])
+        np.concatenate([getattr(one, name) for one in fits])
         for name in ("middle", "residual", "slope")
     )
     # Overlapping residuals: the pooled fit has the effective number of the first one.
-    worth = found[0].sum_of_squares * middle.size / found[0].middle.size
+    worth = fits[0].sum_of_squares * middle.size / fits[0].middle.size
     pooled = dataclasses.replace(
-        found[0], middle=middle, residual=residual, slope=slope, sum_of_squares=worth
+        fits[0], middle=middle, residual=residual, slope=slope, sum_of_squares=worth
     )
     return pooled, slowest

@@ -1,4 +1,4 @@
-"""Outliers and persistent jumps: missed counts of an encoder, slipped turns.
+"""Rules of outliers and persistent jumps: missed counts of an encoder, slipped turns.
 
 A push changes the velocity of a pendulum, but its angle is continuous: a jump that persists is an
 error of the sensor, one that returns an outlier. A jump makes one difference between samples wrong,
@@ -7,23 +7,25 @@ an outlier two. Samples at an end of a record or a gap are predicted from those 
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from pendmap.formatting import counted, moment
-from pendmap.records.noise import DEGREES
+from pendmap.records.clock import longest_between
+from pendmap.records.from_acceleration import swinging
+from pendmap.records.noise import DEGREES, noise_of
+from pendmap.records.rod_sensors import angle_of_rate
 from pendmap.records.slips import slips_of
+from pendmap.records.work import Jump
 from pendmap.signal.local_polynomial import POINTS, local_fit
 from pendmap.signal.robust import broad_scale, normal_scale, widened
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
+    from pendmap.records.experiment import Finding
     from pendmap.records.work import Work
-    from pendmap.signal import Floats, Indices, Mask, Stretch
+    from pendmap.signal import Floats, Indices, Mask
     from pendmap.signal.local_polynomial import LocalFit
 
     _Group = slice | Indices
@@ -47,22 +49,13 @@ PREDICTIONS: Final = 40  # Predictions further inside that give the usual error
 END_DEGREES: Final = (2, 3)  # Degrees of the predicting polynomials
 
 
-@dataclasses.dataclass(frozen=True)
-class _Jump:
-    """Change of the zero by ``size`` +- ``error`` rad before sample ``at``."""
-
-    at: int
-    size: float
-    error: float
-
-
-def find(work: Work) -> None:
-    """Mark outliers; correct jumps by whole counts or keep the longest part between jumps."""
+def outliers(work: Work) -> Finding | None:
+    """Mark outliers, and note the jumps of the reading."""
     theta, bad = work.theta.copy(), ~work.trusted
     if theta.size < 2 * POINTS or bad.all():
-        return
+        return None
     _bridge(work.time, theta, bad)
-    false, jumps = np.zeros(theta.size, bool), list[_Jump]()
+    false, jumps = np.zeros(theta.size, bool), list[Jump]()
     # The motion has corners next to clipped or frozen samples.
     corner = widened(bad, SIDE)
     seen = corner.copy()
@@ -70,15 +63,11 @@ def find(work: Work) -> None:
         at, scale = _suspects(work, theta)
         at, scale = at[~seen[at]], scale[~seen[at]]
         if at.size + np.count_nonzero(false) > MOST_OUTLIERS * theta.size:
-            share = f"{100 * MOST_OUTLIERS:.0f} %"
-            work.report(
-                "not-smooth", f"more than {share} of the samples contradict their neighbours"
-            )
-            return
-        told = _judged(work, theta, at, scale)
-        if not told:
+            return work.finding("not-smooth", percent=100 * MOST_OUTLIERS)
+        verdicts = _judged(work, theta, at, scale)
+        if not verdicts:
             break
-        for k, group, jump in told:
+        for k, group, jump in verdicts:
             seen[k] = True
             false[group] = True
             if jump is not None:
@@ -87,19 +76,18 @@ def find(work: Work) -> None:
         _bridge(work.time, theta, false)
     false |= ~corner & false_ends(work.time, theta, ~(bad | false), SUSPECT, work.count)
     _bridge(work.time, theta, false)
-    jumps.sort(key=lambda jump: jump.at)
+    work.jumps = sorted(jumps, key=lambda jump: jump.at)
     moved = np.zeros(theta.size)
-    for jump in jumps:
+    for jump in work.jumps:
         moved[jump.at :] += jump.size
-    _distrust(work, np.flatnonzero(false & work.trusted), work.theta - moved - theta, "rad")
-    _moved(work, _of_time(work, theta + moved, jumps))
+    work.bridged = theta + moved
+    return _distrust(work, np.flatnonzero(false & work.trusted), work.theta - moved - theta, "rad")
 
 
-def _distrust(work: Work, at: Indices, away: Floats, unit: str) -> None:
+def _distrust(work: Work, at: Indices, away: Floats, unit: str) -> Finding | None:
     """Mark outliers and report the greatest deviation."""
     worst = float(np.max(np.abs(away[at]), initial=0.0))
-    text = f"{counted(at.size, 'outlier')}, the farthest by {worst:.3g} {unit}: not for fitting"
-    work.distrust(at, "outliers", text)
+    return work.distrust(at, "outliers", "outlier", worst=worst, unit=unit)
 
 
 def _bridge(time: Floats, theta: Floats, false: Mask) -> None:
@@ -110,11 +98,8 @@ def _bridge(time: Floats, theta: Floats, false: Mask) -> None:
 
 def _judged(
     work: Work, theta: Floats, at: Indices, scale: Floats
-) -> list[tuple[int, _Group, _Jump | None]]:
-    """Return the suspects that can be judged, with their outliers and jumps.
-
-    Suspects and jumps next to another outlier are judged again after its correction.
-    """
+) -> list[tuple[int, _Group, Jump | None]]:
+    """Return suspects, with outliers and jumps; jumps near outliers are judged after them."""
     verdicts = [
         (k, *_judge(work.time, theta, k, sigma, work.count))
         for k, sigma in zip(at.tolist(), scale.tolist(), strict=True)
@@ -147,10 +132,7 @@ def _suspects(work: Work, theta: Floats) -> tuple[Indices, Floats]:
 
 
 def _highest(fit: LocalFit) -> Mask:
-    """Return the mask of residuals that are the largest of all overlapping windows.
-
-    An outlier changes every window that contains it, its own the most.
-    """
+    """Return the mask of residuals that are the largest of all overlapping windows."""
     from scipy.ndimage import maximum_filter1d
 
     size = np.abs(fit.residual)
@@ -159,7 +141,7 @@ def _highest(fit: LocalFit) -> Mask:
 
 def _judge(
     time: Floats, theta: Floats, k: int, sigma: float, count: float
-) -> tuple[_Group, _Jump | None]:
+) -> tuple[_Group, Jump | None]:
     """Return the outliers around ``k``, and the jump there or None."""
     low, high = max(k - SIDE, 0), min(k + SIDE + 1, theta.size)
     t, part = time[low:high] - time[k], theta[low:high] - theta[k]
@@ -196,7 +178,7 @@ def _judge(
     error = gain * max(sigma, rest, count / math.sqrt(12))
     size = float(answer[-1])
     if abs(size) > CERTAIN_JUMP * error:
-        return group, _Jump(low + last + 1, size, error)
+        return group, Jump(low + last + 1, size, error)
     # Samples between two outliers may be correct.
     inner = slice(first + 1, last + 1)
     off = np.abs(_smooth(t, part))
@@ -225,57 +207,55 @@ def _least_absolute(columns: Floats, y: Floats) -> Floats:
     return answer
 
 
-def _of_time(work: Work, theta: Floats, jumps: list[_Jump]) -> list[_Jump]:
-    """Correct the clock for jumps that are its slips; return the other jumps."""
-    found = slips_of(work.time, theta) if jumps and not work.clock_stderr else None
-    if found is None:
-        return jumps
-    text = (
-        f"{counted(found.places.size, 'slip')} of time: the readings jump by their velocity times"
-        f" {1e3 * found.slip:.4g} +- {1e3 * found.stderr:.1g} ms, an interval, and not by counts:"
-        " the times after each are moved by whole intervals"
-    )
-    work.report("time-slips", text, mended=True, at=found.places)
-    work.time = found.time
-    return [j for j in jumps if np.min(np.abs(found.places - j.at)) > SIDE]
+def slips(work: Work) -> Finding | None:
+    """Correct the clock for jumps that are its slips."""
+    if not work.jumps or work.clock_stderr:
+        return None
+    clock = slips_of(work.time, work.bridged)
+    if clock is None:
+        return None
+    number, size, error = counted(clock.places.size, "slip"), 1e3 * clock.slip, 1e3 * clock.stderr
+    finding = work.finding("time-slips", at=clock.places, slips=number, size=size, error=error)
+    work.time = clock.time
+    work.jumps = [j for j in work.jumps if np.min(np.abs(clock.places - j.at)) > SIDE]
+    return finding
 
 
-def _moved(work: Work, jumps: list[_Jump]) -> None:
+def jumps(work: Work) -> Finding | None:
     """Correct jumps by whole turns or counts, or keep the longest part between jumps."""
-    if not jumps:
-        return
-    places = np.asarray([jump.at for jump in jumps], np.intp)
-    many = f"{counted(len(jumps), 'jump')} of the reading"
-    if len(jumps) > MOST_JUMPS:
-        work.report("missed-counts", f"{many} that stay: the zero drifts", at=places)
-        return
-    turns = [round(jump.size / math.tau) for jump in jumps]
-    off = [abs(j.size - n * math.tau) for j, n in zip(jumps, turns, strict=True)]
-    counts = [_whole(jump, work.count) for jump in jumps]
+    if not work.jumps:
+        return None
+    places = np.asarray([jump.at for jump in work.jumps], np.intp)
+    number = counted(places.size, "jump")
+    if places.size > MOST_JUMPS:
+        return work.finding("missed-counts.many", at=places, jumps=number)
+    sizes = [jump.size for jump in work.jumps]
+    turns = [round(size / math.tau) for size in sizes]
+    off = [abs(size - n * math.tau) for size, n in zip(sizes, turns, strict=True)]
+    counts = [_whole(jump, work.count) for jump in work.jumps]
+    step, whole, key = work.count, counts, "missed-counts.whole"
     if all(turns) and max(off) < OFF_TURN:
-        step, numbers, what, said = math.tau, turns, "turns-slipped", "whole turns"
-    else:
-        said = f"{', '.join(f'{count:+d}' for count in counts[:4])} counts"
-        step, numbers, what = work.count, counts, "missed-counts"
-    if all(numbers):
-        for at, number in zip(places, numbers, strict=True):
-            work.theta[at:] -= number * step
-        work.report(what, f"{many} by {said}, undone", mended=True, at=places)
-        return
-    edges = [0, *places.tolist(), work.time.size]
-    longest = int(np.argmax(np.diff(edges)))
-    low, high = edges[longest : longest + 2]
+        step, whole, key = math.tau, turns, "turns-slipped"
+    if all(whole):
+        for at, steps in zip(places, whole, strict=True):
+            work.theta[at:] -= steps * step
+        by = ", ".join(f"{count:+d}" for count in counts[:4])
+        return work.finding(key, at=places, jumps=number, counts=by)
+    low, high = longest_between([0, *places.tolist()], work.time.size)
     work.trusted[:low] = work.trusted[high:] = False
-    said = ", ".join(f"{jump.size:+.3g}" for jump in jumps[:4])
-    other = max(abs(jump.size) for jump in jumps) > OTHER_RECORD
-    text = (
-        f"{many} ({said} rad) that stay{', or another recording begins' if other else ''}:"
-        f" {moment(work.time[low])} to {moment(work.time[high - 1])} s is for fitting"
+    other = ", or another recording begins" if max(map(abs, sizes)) > OTHER_RECORD else ""
+    return work.finding(
+        "missed-counts",
+        at=places,
+        jumps=number,
+        sizes=", ".join(f"{size:+.3g}" for size in sizes[:4]),
+        other=other,
+        begin=moment(work.time[low]),
+        end=moment(work.time[high - 1]),
     )
-    work.report("missed-counts", text, at=places)
 
 
-def _whole(jump: _Jump, count: float) -> int:
+def _whole(jump: Jump, count: float) -> int:
     """Return the number of counts of a jump, 0 if it is uncertain."""
     if not count or jump.error > OFF_COUNT * count:
         return 0
@@ -283,18 +263,21 @@ def _whole(jump: _Jump, count: float) -> int:
     return number if abs(jump.size / count - number) < OFF_COUNT else 0
 
 
-def find_spikes(work: Work, values: Floats, unit: str, free: Sequence[Stretch]) -> None:
-    """Mark readings of an accelerometer or gyroscope far from their neighbours.
-
-    Persistent jumps are ignored: friction causes them, and a hand at the ends of the ``free``
-    swings. Readings outside of these are not fitted.
-    """
+def spikes(work: Work) -> Finding | None:
+    """Mark readings of a sensor on the rod far from their neighbours, in free swings; no jumps."""
+    sensor = work.angle_source
+    if sensor is None:
+        values, unit, free = work.extra["velocity"], "rad/s", [(0, work.time.size)]
+    else:
+        # The acceleration is checked, since the angle computed from it has corners.
+        values, unit = work.extra["acceleration"], sensor.unit
+        free, _ = swinging(work.time, values, noise_of(work.time, values).sigma)
     if work.time.size < 2 * POINTS:
-        return
+        return None
     fit = local_fit(work.time, values)
     size = np.abs(fit.residual)
     if size.size < POINTS:
-        return
+        return None
     at = fit.middle[(size > 2 * SUSPECT * broad_scale(size)) & _highest(fit)]
     inside = np.zeros(values.size, bool)
     for low, high in free:
@@ -302,17 +285,19 @@ def find_spikes(work: Work, values: Floats, unit: str, free: Sequence[Stretch]) 
         inside[begin : high if high == values.size else high - POINTS] = True
     at = at[inside[at]]
     if at.size > MOST_OUTLIERS * values.size:
-        return
+        return None
     away = np.zeros(values.size)
     away[at] = [values[k] - np.median(values[max(k - SIDE, 0) : k + SIDE + 1]) for k in at]
-    _distrust(work, at, away, unit)
+    return _distrust(work, at, away, unit)
+
+
+def integrate_again(work: Work) -> None:
+    """Integrate a rate without the readings that are marked."""
+    work.theta = angle_of_rate(work.time, work.extra["velocity"], work.trusted)
 
 
 def false_ends(time: Floats, theta: Floats, trusted: Mask, limit: float, count: float) -> Mask:
-    """Return the mask of outliers at the ends of a record and of its gaps, shape (N,).
-
-    ``limit`` is in usual errors of prediction; ``count`` is the resolution of the readings, rad.
-    """
+    """Return the mask of outliers at ends and gaps; ``limit`` is in usual errors of prediction."""
     false = np.zeros(theta.size, bool)
     good = np.flatnonzero(trusted)
     if good.size < 2:

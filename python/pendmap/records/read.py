@@ -11,22 +11,13 @@ from typing import TYPE_CHECKING, Final, TypeAlias
 
 from pendmap.errors import InputError, check_number, short_repr
 from pendmap.formatting import counted, listed
-from pendmap.records import (
-    angle,
-    clock,
-    cross_checks,
-    motion,
-    noise,
-    resolution,
-    samples,
-    scale,
-    trigger,
-)
 from pendmap.records.across import checked_together
 from pendmap.records.channels import channels_of
 from pendmap.records.description import NAME, Description, RunPlan, read_description
 from pendmap.records.experiment import Experiment, Finding, Run
+from pendmap.records.findings import finding_of
 from pendmap.records.rod_sensors import gyroscope_of
+from pendmap.records.rules import OF_RELEASE, RULES, apply
 from pendmap.records.tables import is_frame, read_table, table_of
 
 if TYPE_CHECKING:
@@ -59,8 +50,8 @@ def files_of(path: str | os.PathLike[str]) -> list[Path]:
     place = Path(path)
     if not place.is_dir():
         return [place]
-    own = [place / NAME] if (place / NAME).is_file() else []
-    return own + [
+    description = [place / NAME] if (place / NAME).is_file() else []
+    return description + [
         place / file for file in dict.fromkeys(plan.file for plan in _planned(place).runs)
     ]
 
@@ -157,7 +148,7 @@ def experiment_of(
         name = f"{run.name} ({before[run.name]})" if before[run.name] > 1 else run.name
         runs.append(run if name == run.name else dataclasses.replace(run, name=name))
     checked, together = checked_together(runs)
-    findings = dict.fromkeys([*(found for part in parts for found in part.findings), *together])
+    findings = dict.fromkeys([*(finding for part in parts for finding in part.findings), *together])
     digests = {file: digest for part in parts for file, digest in part.sha256.items()}
     place = Path(listed([part.path.name for part in parts], _SHOWN))
     return Experiment(place, checked, known, tuple(findings), digests)
@@ -194,22 +185,21 @@ def _every(place: Path, description: Description) -> tuple[list[Run], list[Findi
     plain = place.is_dir() and not described
     runs, findings, refused = list[Run](), list[Finding](), list[str]()
     if plain:
-        text = f"no {NAME}: each file is taken for one free run, in the order of the names"
-        findings.append(Finding("no-description", text))
+        findings.append(finding_of("no-description"))
     tables: dict[str, tuple[Table, str]] = {}
     for count, (plan, name) in enumerate(zip(plans, _names(plans), strict=True), 1):
         path = place / plan.file if place.is_dir() else place
         if described and not path.exists():
             raise InputError(f"{place / NAME}: [[run]] {count}: no file {plan.file!r}")
         try:
-            found, shared = _runs(path, plan, description, tables if described else {}, name)
+            of_file, shared = _runs(path, plan, description, tables if described else {}, name)
         except InputError as error:
             if not plain:
                 raise
             refused.append(str(error))
-            findings.append(Finding("file-left-out", f"left out: {error}"))
+            findings.append(finding_of("file-left-out", error=error))
         else:
-            runs += found
+            runs += of_file
             findings += shared
     if not runs:
         first = f", the first refused: {refused[0]}" if refused else f" of {', '.join(TABLES)}"
@@ -233,7 +223,7 @@ def _names(plans: Sequence[RunPlan]) -> list[str]:
     return names
 
 
-def _runs(  # noqa: C901 (a step each)
+def _runs(
     path: Path,
     plan: RunPlan,
     description: Description,
@@ -245,46 +235,13 @@ def _runs(  # noqa: C901 (a step each)
         tables[plan.file] = read_table(path, description.reader)
     table, digest = tables[plan.file]
     work = channels_of(table, description, plan, str(path))
-    if plan.kind == "forced" and plan.drive is None and plan.pivot is None:
-        text = 'kind is "forced" but neither drive nor pivot is given'
-        work.report("drive-missing", text)
-    clock.mend(work)
-    work.cut(plan.from_s, plan.to_s)
-    if not work.peaks_only:
-        clock.cut_at_pauses(work)
-    angle.check_peaks(work)
-    angle.make(work)
-    if not work.peaks_only:
-        resolution.put_on_edges(work)
-    if work.peaks_only or work.edges:
-        # The intervals are those of turning points or encoder edges, not of a clock.
-        work.findings = [found for found in work.findings if found.what not in clock.SPACING]
-    if work.peaks_only:
-        work.refuse_short()
-        return [_run(work, name, digest)], []
-    if not work.edges:
-        samples.keep_readings(work)
-    samples.check(work)
-    moves = motion.moves(work)
-    if moves and work.angle_source is None:
-        scale.check(work)
-    samples.say_steps(work)
-    if moves:
-        motion.check(work)
-        trigger.check_drive(work)
-        cross_checks.check(work)
-        resolution.check(work)
-    cross_checks.smooth_pivot(work)
-    work.refuse_short()
-    works, shared = work.split_by_release()
+    apply(RULES, work)
+    parts, shared = work.split_by_release()
     runs = []
-    for k, part in enumerate(works, 1):
-        if moves:
-            motion.check_zero(part)
-            noise.check(part)
-        own = f"{name} {k}/{len(works)}" if len(works) > 1 else name
-        runs.append(_run(part, own, digest))
-    return runs, [dataclasses.replace(found, where=found.where or name) for found in shared]
+    for k, part in enumerate(parts, 1):
+        apply(OF_RELEASE, part)
+        runs.append(_run(part, f"{name} {k}/{len(parts)}" if len(parts) > 1 else name, digest))
+    return runs, [dataclasses.replace(finding, where=finding.where or name) for finding in shared]
 
 
 def _run(work: Work, name: str, digest: str) -> Run:

@@ -53,8 +53,8 @@ def _let_go(work: Work, part: Stretch, hand: Mask) -> int:
         if not hand[before:low].all():
             return max(low, left)
         # The hand holds the pendulum until the motion begins.
-        found = held_short(work, (before, high))
-        return low if found is None else min(low, found)
+        begin = held_short(work, (before, high))
+        return low if begin is None else min(low, begin)
     return low
 
 
@@ -142,10 +142,10 @@ def held_short(work: Work, part: Stretch) -> int | None:
     left = low
     for _ in range(2):
         level = float(np.median(work.theta[low : max(low + 5, (low + left) // 2)]))
-        found = _left(work, part, level)
-        if found is None:
+        away = _left(work, part, level)
+        if away is None:
             return None
-        left = found
+        left = away
     pull = abs(math.sin(level - work.middle))
     if pull < NEAR_UPRIGHT:
         return None
@@ -210,11 +210,7 @@ def touched(work: Work, parts: list[Stretch]) -> Mask:
 
 
 def _trimmed(columns: Floats, target: Floats, gravity: float) -> Floats:
-    """Return coefficients by least trimmed squares.
-
-    Concentration steps of Rousseeuw & Van Driessen (2006), Data Mining and Knowledge Discovery 12,
-    29, from a pendulum of approximately the right period.
-    """
+    """Return coefficients by least trimmed squares (Rousseeuw & Van Driessen, 2006)."""
     answer = np.array([gravity, *[0.0] * (columns.shape[1] - 1)])
     for _ in range(CONCENTRATIONS):
         away = np.abs(target - columns @ answer)

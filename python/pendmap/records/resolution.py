@@ -16,9 +16,10 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.formatting import counted
-from pendmap.records.scale import gain_of
+from pendmap.records.periods import gain_of
 
 if TYPE_CHECKING:
+    from pendmap.records.experiment import Finding
     from pendmap.records.work import Work
     from pendmap.signal import Floats
 
@@ -37,47 +38,44 @@ EDGE_SHARE: Final = 0.95  # Share of single-count steps above which a record is 
 FEWEST_EDGES: Final = 50  # Fewest readings from which edges are recognized
 
 
-def check(work: Work) -> None:
-    """Report too few readings for a fit or drive, and swings too small to determine the gain."""
+def used_share(work: Work) -> Finding | None:
+    """Report a record of whose motion a fit would use a small part."""
     moving = np.ones(work.time.size, bool)
     for part in work.segments:
         if part.what in RESTING:
             moving &= (work.time < part.from_s) | (work.time > part.to_s)
     used, whole = int(work.trusted.sum()), int((moving | work.trusted).sum())
-    if 0 < used < LEAST_USED * whole:
-        text = (
-            f"only {used} of {counted(whole, 'reading')} in motion are for fitting: the fit "
-            "may not describe the others"
-        )
-        work.report("few-used", text)
+    if not 0 < used < LEAST_USED * whole:
+        return None
+    return work.finding("few-used", used=used, readings=counted(whole, "reading"))
+
+
+def drive(work: Work) -> Finding | None:
+    """Report a drive that is sampled too slowly."""
     rate = 1 / float(np.median(np.diff(work.time)))
     drive = ((work.plan.drive or {}).get("Omega") or 0.0) / math.tau
-    if rate < NYQUIST * drive:
-        text = (
-            f"the drive of {drive:.4g} Hz is read at {rate:.4g} Hz: {rate / drive:.3g} readings a"
-            f" period do not resolve it, {NYQUIST:g} and more would; it looks like one of"
-            f" {abs(drive - rate * round(drive / rate)):.3g} Hz"
-        )
-        work.report("drive-unresolved", text)
-    free = work.plan.kind == "free" and work.angle_source is None and not work.integrated
-    gain = gain_of(work) if free else None
-    if gain is not None and gain[1] - gain[0] > 2 * GAIN_KNOWN:
-        low, high = gain
-        between = f"{low:.2g} to {high:.2g}" if math.isfinite(high) else f"{low:.2g} or more"
-        text = (
-            f"swings so small hardly determine the gain of the sensor: by the growth of the period"
-            f" with the swing, the readings are {between} times the angle (95 %); friction is as"
-            " uncertain"
-        )
-        work.report("gain-unknown", text)
+    if rate >= NYQUIST * drive:
+        return None
+    number, alias = rate / drive, abs(drive - rate * round(drive / rate))
+    return work.finding(
+        "drive-unresolved", drive=drive, rate=rate, number=number, least=NYQUIST, alias=alias
+    )
+
+
+def gain(work: Work) -> Finding | None:
+    """Report swings too small to determine the gain of the sensor."""
+    free = work.free and work.angle_source is None and not work.integrated
+    good = work.trusted
+    interval = gain_of(work.time[good], work.theta[good], work.count) if free else None
+    if interval is None or interval[1] - interval[0] <= 2 * GAIN_KNOWN:
+        return None
+    low, high = interval
+    between = f"{low:.2g} to {high:.2g}" if math.isfinite(high) else f"{low:.2g} or more"
+    return work.finding("gain-unknown", between=between)
 
 
 def step_of(theta: Floats) -> float:
-    """Return the step of readings, rad; 0 if there is none.
-
-    The least distance of different readings is refined with all of them; it is a step if readings
-    repeat and are multiples of it.
-    """
+    """Return the step of readings that repeat and are multiples of it, rad; 0 if there is none."""
     values = np.unique(np.round(theta, 12))
     if values.size < 3 or values.size > 0.7 * theta.size:
         return 0.0
@@ -100,20 +98,13 @@ def step_of(theta: Floats) -> float:
 
 
 def levels_shared(theta: Floats, step: float) -> float:
-    """Return the factor by which quantization increases the noise of a mean.
-
-    Readings on one step share an error: each step is equivalent to three independent readings.
-    """
+    """Return the factor on the noise of a mean by steps, each worth three readings."""
     levels = np.unique(np.round(theta / step)).size
     return math.sqrt(max(theta.size / (3 * max(levels, 1)), 1.0))
 
 
 def still_noise(theta: Floats, count: float) -> tuple[float, float] | None:
-    """Return the noise of readings at rest, rounding included, and its standard error, rad.
-
-    They are posterior mean and standard deviation of ``sqrt(s^2 + count^2 / 12)``. Returns None if
-    the readings have a single count, too many or a drift.
-    """
+    """Return the noise of readings at rest, and its error; None for one count, many or a drift."""
     from scipy.special import log_ndtr, logsumexp, ndtr
 
     steps = np.rint((theta - np.median(theta)) / count).astype(int)
@@ -159,7 +150,7 @@ def spread_stamps(time: Floats) -> Floats:
     return np.asarray(time + share * tick)
 
 
-def put_on_edges(work: Work) -> None:
+def edges(work: Work) -> None:
     """Shift the readings of a log of edges by half a count to the edges."""
     if work.plan.pivot is not None or not logs_edges(work.theta):
         return

@@ -54,10 +54,7 @@ class Accelerometer:
 
 
 def accelerometer_of(column: Column, head: str, gravity: float) -> tuple[Accelerometer | None, str]:
-    """Return the accelerometer of a column, or None and the missing keys of its position.
-
-    A heading like "linear acceleration" means without gravity; ``gravity`` is in m/s^2.
-    """
+    """Return the accelerometer of a column, or None and the missing keys of its position."""
     heading, unit = name_and_unit(head)
     angular = column.scale is None and spelling(column.unit or unit or "") in ANGULAR_ACCELERATIONS
     direction = column.direction or ("angular" if angular else None)
@@ -91,11 +88,7 @@ class Gyroscope:
 
 
 def angle_of_rate(time: Floats, rate: Floats, good: Mask | None = None) -> Floats:
-    """Return the integral of a rate, rad, shape (N,); 0 is the middle of the swing.
-
-    The linear drift by the bias is removed. For a record with rotations the last angle is 0.
-    Readings that are not ``good`` are interpolated by a cubic spline.
-    """
+    """Return the integral of a rate about the middle of the swing, less the drift by the bias."""
     from scipy.interpolate import CubicSpline
 
     if good is None or np.count_nonzero(good) < 2:
@@ -106,29 +99,29 @@ def angle_of_rate(time: Floats, rate: Floats, good: Mask | None = None) -> Float
         return np.asarray(theta - theta[-1])
     # Turning points about the straight line through all angles give the middles of the swings.
     trend = np.polyval(np.polyfit(time, theta, 1), time)
-    found = swings(time, theta - trend)
-    if found.peak_time.size < FEWEST_PEAKS:
+    half = swings(time, theta - trend)
+    if half.peak_time.size < FEWEST_PEAKS:
         return np.asarray(theta - np.median(theta))
-    peaks = found.peak + np.interp(found.peak_time, time, trend)
-    middle = dataclasses.replace(found, peak=peaks).middle
-    line = np.polyfit(found.peak_time[1:-1], middle, 1)
+    peaks = half.peak + np.interp(half.peak_time, time, trend)
+    middle = dataclasses.replace(half, peak=peaks).middle
+    line = np.polyfit(half.peak_time[1:-1], middle, 1)
     return np.asarray(theta - np.polyval(line, time))
 
 
 def gyroscope_of(time: Floats, theta: Floats, rate: Floats) -> Gyroscope:
     """Return the gyroscope with ``w0`` and bias estimated from a rate and its integral."""
-    found = swings(time, theta)
+    half = swings(time, theta)
     bias = math.nan
-    if np.ptp(theta - np.median(theta)) <= OVER_THE_TOP and found.peak_time.size >= FEWEST_PEAKS:
+    if np.ptp(theta - np.median(theta)) <= OVER_THE_TOP and half.peak_time.size >= FEWEST_PEAKS:
         # The removed line has the slope of the bias; the median is robust to outliers.
         bias = float(np.median((rate[1:] + rate[:-1]) / 2 - np.diff(theta) / np.diff(time)))
-    speed, size = np.abs(rate - np.nan_to_num(bias)), np.abs(found.peak)
+    speed, size = np.abs(rate - np.nan_to_num(bias)), np.abs(half.peak)
     swung = (size[:-1] < math.pi) & (size[1:] < math.pi)
     if not np.any(swung):
         # A pendulum rotates if its greatest speed exceeds 2 w0.
         return Gyroscope(float(np.max(speed)) / 2 or 1.0, bias)
     # The energy of a swing gives th' = 2 w0 sin(A/2) in the middle.
     middle = (size[:-1] + size[1:]) / 2
-    passing = np.interp(found.crossing[1:-1], time, speed)[swung]
+    passing = np.interp(half.crossing[1:-1], time, speed)[swung]
     w0 = float(np.sum(passing) / np.sum(2 * np.sin(middle[swung] / 2)))
     return Gyroscope(w0, bias)

@@ -1,4 +1,4 @@
-"""Samples that are not independent readings: interpolated, clipped, frozen; step of the readings.
+"""Rules of samples that are no independent readings: interpolated, clipped, frozen, in steps.
 
 Between two readings an interpolated record is a polynomial of low degree: differences of the next
 order vanish, at the same samples of every interval, but not across a reading.
@@ -13,15 +13,13 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.formatting import counted
-from pendmap.records import outliers
-from pendmap.records.from_acceleration import swinging
-from pendmap.records.noise import DITHERED, FARTHEST, fastest, noise_of
+from pendmap.records.noise import DITHERED, FARTHEST, fastest
 from pendmap.records.resolution import step_of
-from pendmap.records.rod_sensors import angle_of_rate
 from pendmap.signal.local_polynomial import local_fit
 from pendmap.signal.robust import equal_runs, normal_scale
 
 if TYPE_CHECKING:
+    from pendmap.records.experiment import Finding
     from pendmap.records.work import Work
     from pendmap.signal import Floats, Indices
 
@@ -43,64 +41,42 @@ FOLLOWED: Final = 1.3  # Residual of a quartic over that of a sextic above which
 _EVEN: Final = 1e-3  # Greatest relative deviation of an interval in an evenly sampled record
 
 
-def check(work: Work) -> None:
-    """Mark clipped and frozen samples and outliers, correct missed counts, and report all."""
-    if work.angle_source is not None:
-        # The acceleration is checked, since the angle computed from it has corners.
-        readings = work.extra["acceleration"]
-        free, _ = swinging(work.time, readings, noise_of(work.time, readings).sigma)
-        outliers.find_spikes(work, readings, work.angle_source.unit, free)
-    elif work.integrated:
-        rate = work.extra["velocity"]
-        read = dataclasses.replace(work, theta=rate, count=step_of(rate))
-        _clipped(read, "rad/s")
-        outliers.find_spikes(work, rate, "rad/s", [(0, rate.size)])
-        work.theta = angle_of_rate(work.time, rate, work.trusted)
-    else:
-        work.estimated_step = work.estimated_step if work.edges else step_of(work.theta)
-        work.count = _count(work)
-        _clipped(work, "rad")
-        _frozen(work)
-        outliers.find(work)
+def step(work: Work) -> None:
+    """Set the step of the readings, rad, from the description or the readings."""
+    if not work.edges:
+        work.estimated_step = step_of(work.theta)
+    work.count = _count(work)
 
 
 def _count(work: Work) -> float:
     """Return the step of the readings, rad, from the description or the readings."""
-    counts = work.known.get("encoder_counts")
-    if counts is None:
-        return work.estimated_step
-    count = 2 * math.pi / float(counts)
-    return (
-        work.estimated_step
-        if work.estimated_step > 1.5 * count and work.theta.size > 200
-        else count
-    )
+    counts, seen = work.known.get("encoder_counts"), work.estimated_step
+    count = 2 * math.pi / float(counts) if counts else seen
+    return seen if seen > 1.5 * count and work.theta.size > 200 else count
 
 
-def say_steps(work: Work) -> None:
+def named_step(work: Work) -> Finding | None:
     """Report the step of the readings, or that they are edges; called once the unit is certain."""
     if work.integrated:
-        return  # an integral has no steps
+        return None  # an integral has no steps
     turn = f"{2 * math.pi / (work.estimated_step or math.inf):.5g}"
     if work.edges:
-        text = (
-            f"an encoder of {turn} counts a turn writes a line at each edge: the angles are those"
-            f" of {counted(work.theta.size, 'edge')}, their errors those of the stamps; none is"
-            " missing between two of them"
-        )
-        work.report("edges-logged", text, mended=True)
-        return
+        return work.finding("edges-logged", turn=turn, edges=counted(work.theta.size, "edge"))
     counts, seen = work.known.get("encoder_counts"), work.estimated_step
     work.count = _count(work)
-    text = f"the readings come in steps of {seen:.4g} rad"
     if counts is None and seen > FINEST:
-        work.report("counts-seen", f"{text} ({turn} a turn)")
-    elif counts is not None and work.count == seen > 3 * math.pi / float(counts):
-        work.report("counts-differ", f"{text}, {turn} a turn: encoder_counts says {counts}")
+        return work.finding("counts-seen", step=seen, turn=turn)
+    if counts is not None and work.count == seen > 3 * math.pi / float(counts):
+        return work.finding("counts-differ", step=seen, turn=turn, counts=counts)
+    return None
 
 
-def _clipped(work: Work, unit: str) -> None:
+def clipped(work: Work) -> Finding | None:
     """Mark plateaus at the ends of the range that the motion reaches at speed."""
+    unit = "rad"
+    if work.integrated:
+        rate, unit = work.extra["velocity"], "rad/s"
+        work = dataclasses.replace(work, theta=rate, count=step_of(rate))
     marked = np.zeros(work.theta.size, bool)
     ends = []
     low, high = equal_runs(work.theta, EQUAL_READINGS)
@@ -116,9 +92,7 @@ def _clipped(work: Work, unit: str) -> None:
             ends.append(f"{end:.4g}")
             marked |= ended  # including shorter plateaus
     at = np.flatnonzero(marked)
-    text = f"the sensor's range ends at {' and '.join(ends)} {unit}"
-    count = counted(at.size, "clipped sample")
-    work.distrust(at, "clipped", f"{text}: {count} not for fitting")
+    return work.distrust(at, "clipped", "clipped sample", ends=" and ".join(ends), unit=unit)
 
 
 def _cut_off(work: Work, low: int, high: int) -> bool:
@@ -141,7 +115,7 @@ def _cut_off(work: Work, low: int, high: int) -> bool:
     return beyond > 2 * work.count + BEYOND_FIT * noise
 
 
-def _frozen(work: Work) -> None:
+def frozen(work: Work) -> Finding | None:
     """Mark constant readings in the middle of a motion."""
     low, high = equal_runs(work.theta, EQUAL_READINGS)
     marked = np.zeros(work.theta.size, bool)
@@ -154,15 +128,11 @@ def _frozen(work: Work) -> None:
         if jump * before > 0 and quick and _abrupt(work, a, b):
             marked[a:b] = True
     at = np.flatnonzero(marked)
-    text = f"the reading stands still while the pendulum moves: {counted(at.size, 'sample')}"
-    work.distrust(at, "frozen", f"{text} not for fitting")
+    return work.distrust(at, "frozen", "sample")
 
 
 def _abrupt(work: Work, low: int, high: int) -> bool:
-    """Return whether a plateau is flatter than any turning point.
-
-    With speed v at its border, a turning point is within v tau/2 of its extreme after a time tau.
-    """
+    """Return whether a plateau is flatter than a turning point, within v tau/2 of its extreme."""
     noise = float(np.median(np.abs(np.diff(work.theta, 2)))) if work.theta.size > 2 else 0.0
     return _missed(work, low, high) > 2 * work.count + 3 * min(noise, 0.01)
 
@@ -188,11 +158,7 @@ class Resampled:
 
 
 def measured(time: Floats, theta: Floats) -> Resampled | None:
-    """Return the readings of a record whose other samples are interpolated.
-
-    Returns None if every sample may be a reading: uneven times, no integer ratio, equal
-    differences.
-    """
+    """Return the readings of a record with interpolated samples; None if all may be readings."""
     if theta.size < FEWEST_SAMPLES or np.ptp(theta) == 0:
         return None
     steps = np.diff(time)
@@ -255,22 +221,23 @@ def _independent(time: Floats, theta: Floats, farthest: float) -> int:
     return strides[next((k for k, one in enumerate(noise) if one > INDEPENDENT * most), 0)]
 
 
-def keep_readings(work: Work) -> None:
-    """Keep only the readings of an interpolated record, and report it."""
-    found = measured(work.time, work.theta)
-    if found is None or not found.made:
-        return
+def interpolated(work: Work) -> Finding | None:
+    """Keep only the readings of an interpolated record."""
+    readings = measured(work.time, work.theta)
+    if readings is None or not readings.made:
+        return None
     samples = work.time.size
     rate = (samples - 1) / float(work.time[-1] - work.time[0])
-    how = "each held" if found.made == "held" else f"{found.made} between"
-    text = f"the record repeats {_hertz(rate / found.ratio)} at {_hertz(rate)}, {how}"
+    how = "each held" if readings.made == "held" else f"{readings.made} between"
+    from_hz, to_hz = _hertz(rate / readings.ratio), _hertz(rate)
     if work.pivot:
         # The pivot may have been read at every sample.
-        work.report("interpolated", f"{text}: errors from the number of samples are too small")
-        return
-    work.keep(found.places)
-    kept = counted(found.places.size, "reading")
-    work.report("interpolated", f"{text}: {kept} kept of {samples} samples", mended=True)
+        return work.finding("interpolated.pivot", from_hz=from_hz, to_hz=to_hz, how=how)
+    work.keep(readings.places)
+    number = counted(readings.places.size, "reading")
+    return work.finding(
+        "interpolated", from_hz=from_hz, to_hz=to_hz, how=how, readings=number, samples=samples
+    )
 
 
 def _hertz(rate: float) -> str:

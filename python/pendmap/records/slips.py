@@ -62,13 +62,13 @@ def slips_of(time: Floats, theta: Floats, fewest: int = FEWEST_SLIPS) -> Slips |
         grid = np.arange(mended[0], mended[-1] + interval / 2, interval)
         at, lag = _found(CubicSpline(mended, theta)(grid), reach, limit)
         number = 1 + np.argmin(np.abs(lag[:, None] - shown), axis=1)
-        each = lag / shown[number - 1]
-        good = np.abs(each - 1) < OFF_INTERVAL
+        size = lag / shown[number - 1]
+        good = np.abs(size - 1) < OFF_INTERVAL
         if not places:
             if np.count_nonzero(good) < fewest or np.mean(~good) > MOST_OTHER_JUMPS:
                 return None
-            slip = interval * float(np.mean(each[good]))
-            stderr = interval * float(np.std(each[good])) / math.sqrt(np.count_nonzero(good))
+            slip = interval * float(np.mean(size[good]))
+            stderr = interval * float(np.std(size[good])) / math.sqrt(np.count_nonzero(good))
         if not good.any():
             break
         starts = np.searchsorted(mended, grid[at[good]] - interval / 2).tolist()

@@ -26,11 +26,7 @@ SCALE_FINDING: Final = "angle-scale"  # Unit finding that an effect can cause, t
 
 
 def as_json(experiment: Experiment) -> dict[str, Any]:
-    """Return the JSON object of ``pendmap look``.
-
-    The top level repeats the fields of a single run; for several runs, it has the median rate, the
-    largest noise, and all channels, segments and findings with their run.
-    """
+    """Return the JSON object of ``pendmap look``; its top level joins the fields of the runs."""
     runs = [_run(run) for run in experiment.runs]
     whole: dict[str, Any] = {"path": str(experiment.path), "known": dict(experiment.known)}
     whole["unused"] = list(dict.fromkeys(name for run in runs for name in run["unused"]))
@@ -43,8 +39,8 @@ def as_json(experiment: Experiment) -> dict[str, Any]:
         whole["rate_hz"] = float(np.median([run["rate_hz"] for run in runs]))
         whole["noise"] = loudest["noise"] | {"run": loudest["name"]}
         whole["segments"] = [{"run": r["name"], **s} for r in runs for s in r["segments"]]
-    findings = [{"run": r["name"], **found} for r in runs for found in r["findings"]]
-    whole["findings"] = [dataclasses.asdict(found) for found in experiment.findings] + findings
+    findings = [{"run": r["name"], **finding} for r in runs for finding in r["findings"]]
+    whole["findings"] = [dataclasses.asdict(finding) for finding in experiment.findings] + findings
     whole["runs"] = runs
     return whole
 
@@ -52,9 +48,9 @@ def as_json(experiment: Experiment) -> dict[str, Any]:
 def _run(run: Run) -> dict[str, Any]:
     """Return the JSON object of a run."""
     used = run.theta[run.trusted]
-    own = ("name", "file", "sha256", "kind", "lab_time_s", "hold_out")
+    same = ("name", "file", "sha256", "kind", "lab_time_s", "hold_out")
     return {
-        **{key: getattr(run, key) for key in own},
+        **{key: getattr(run, key) for key in same},
         "drive": None if run.drive is None else dict(run.drive),
         "channels": dict(run.channels),
         "unused": list(run.unused),
@@ -70,7 +66,7 @@ def _run(run: Run) -> dict[str, Any]:
         "noise": dataclasses.asdict(noise_floor(run)) | {"unit": noise_unit(run)},
         "gyroscope_bias": _bias(run),
         "segments": [dataclasses.asdict(segment) for segment in run.segments],
-        "findings": [dataclasses.asdict(found) for found in run.findings],
+        "findings": [dataclasses.asdict(finding) for finding in run.findings],
     }
 
 
@@ -80,7 +76,7 @@ def as_text(experiment: Experiment) -> str:
     if experiment.known:
         known = ", ".join(f"{name} {value:g}" for name, value in experiment.known.items())
         lines.append(f"rig       {known}")
-    lines += [_line(found) for found in experiment.findings]
+    lines += [_line(finding) for finding in experiment.findings]
     for run in experiment.runs:
         if lines:
             lines.append("")
@@ -116,29 +112,29 @@ def _lines(run: Run) -> Iterator[str]:
     if not run.peaks_only:
         yield f"  noise     {noise_said(noise_floor(run), noise_unit(run))}"
     if (bias := _bias(run)) is not None:
-        said = f"{bias:+.3g} rad/s, reading of the gyroscope at rest by the drift of the angle"
-        yield f"  bias      {said}; left to the fit"
+        text = f"{bias:+.3g} rad/s, reading of the gyroscope at rest by the drift of the angle"
+        yield f"  bias      {text}; left to the fit"
     for segment in run.segments:
         used = "for fitting" if segment.used else "not for fitting"
         yield f"  {segment.what:<9} {moment(segment.from_s)} to {moment(segment.to_s)} s, {used}"
-    mended = sum(found.mended for found in run.findings)
+    mended = sum(finding.mended for finding in run.findings)
     many = counted(len(run.findings), "finding")
     yield f"  {many}, {mended} of them mended" if run.findings else "  no findings"
-    for found in run.findings:
-        yield f"  {_line(found)}"
+    for finding in run.findings:
+        yield f"  {_line(finding)}"
 
 
-def _line(found: Finding) -> str:
+def _line(finding: Finding) -> str:
     """Return the line of a finding."""
-    mark = "mended: " if found.mended else ""
-    where = f" ({found.where})" if found.where.startswith(("row", "line")) else ""
-    return f"- {mark}{found.text}{where}  [{found.what}]"
+    mark = "mended: " if finding.mended else ""
+    where = f" ({finding.where})" if finding.where.startswith(("row", "line")) else ""
+    return f"- {mark}{finding.text}{where}  [{finding.what}]"
 
 
 def doubts(experiment: Experiment, *runs: Run) -> list[str]:
     """Return the texts of all uncorrected findings that make results doubtful."""
-    said = experiment.findings_of(runs)
-    return [f"{where}: {found.text}" for where, found in said if _doubted(found)]
+    findings = experiment.findings_of(runs)
+    return [f"{where}: {finding.text}" for where, finding in findings if _doubted(finding)]
 
 
 def doubt_lines(experiment: Experiment, *runs: Run) -> Iterator[str]:
@@ -148,8 +144,8 @@ def doubt_lines(experiment: Experiment, *runs: Run) -> Iterator[str]:
 
 def doubt_keys(experiment: Experiment, *runs: Run) -> set[str]:
     """Return the keys of uncorrected doubtful findings, without the scale of the angle."""
-    said = {found.what for _, found in experiment.findings_of(runs) if _doubted(found)}
-    return said - {SCALE_FINDING}
+    keys = {finding.what for _, finding in experiment.findings_of(runs) if _doubted(finding)}
+    return keys - {SCALE_FINDING}
 
 
 def unit_wrong(experiment: Experiment, *runs: Run) -> bool:
@@ -159,15 +155,15 @@ def unit_wrong(experiment: Experiment, *runs: Run) -> bool:
 
 def finding_lines(experiment: Experiment, *runs: Run, changes: bool = False) -> Iterator[str]:
     """Yield a line for each finding that is not in :func:`doubts`, or for changes of data alone."""
-    for where, found in experiment.findings_of(runs):
-        changed = found.mended or found.what == "file-left-out"
-        if not _doubted(found) and (changed or not changes):
-            yield f"{where}: {'mended: ' if found.mended else ''}{found.text}"
+    for where, finding in experiment.findings_of(runs):
+        changed = finding.mended or finding.what == "file-left-out"
+        if not _doubted(finding) and (changed or not changes):
+            yield f"{where}: {'mended: ' if finding.mended else ''}{finding.text}"
 
 
-def _doubted(found: Finding) -> bool:
+def _doubted(finding: Finding) -> bool:
     """Return whether a finding makes results doubtful and is not corrected."""
-    return found.what in DOUBTFUL and not found.mended
+    return finding.what in DOUBTFUL and not finding.mended
 
 
 def noise_unit(run: Run) -> str:
@@ -189,12 +185,12 @@ def noise_said(noise: NoiseFloor, unit: str = "rad") -> str:
     if noise.bound:
         few = "motion included: few samples a period"
         return f"at most {noise.sigma:.2g} {unit} ({degrees}), {few}"
-    said = f"{noise.sigma:.3g} +- {noise.stderr:.1g} {unit} ({degrees})"
+    text = f"{noise.sigma:.3g} +- {noise.stderr:.1g} {unit} ({degrees})"
     if noise.limited_by_count:
-        return f"{said}, that of rounding to counts: the record shows no less"
+        return f"{text}, that of rounding to counts: the record shows no less"
     if noise.by_speed:
         slow, fast = noise.by_speed[0], noise.by_speed[-1]
         if fast.sigma > 1.2 * slow.sigma + 3 * (slow.stderr + fast.stderr):
             what = "speed" if unit == "rad" else "acceleration"
-            said += f", {slow.sigma:.2g} at low and {fast.sigma:.2g} at high {what}"
-    return said
+            text += f", {slow.sigma:.2g} at low and {fast.sigma:.2g} at high {what}"
+    return text

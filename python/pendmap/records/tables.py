@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import datetime as dt
 import hashlib
 import io
 import re
@@ -15,17 +16,18 @@ import numpy as np
 from pendmap.errors import InputError
 from pendmap.files import read_whole
 from pendmap.formatting import counted, listed
-from pendmap.records.dates import without_dates
-from pendmap.records.experiment import Finding
+from pendmap.records.findings import finding_of
 from pendmap.records.units import CHANNELS
 from pendmap.records.workbooks import WORKBOOKS, sheet_text
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
     from pathlib import Path
 
     import pandas as pd
 
     from pendmap.records.description import Reader
+    from pendmap.records.experiment import Finding
     from pendmap.signal import Floats, Indices
 
 MOST_COLUMNS: Final = 1000  # Most columns of a table
@@ -53,6 +55,11 @@ _CONTROLS: Final = re.compile(r"[\x01-\x08\x0b\x0e-\x1f\x7f]")
 _HEADS: Final = 30  # Most lines above the numbers of a short file
 TIME: Final = "t_s"  # Heading of times that a record has as dates
 LARGEST_READING: Final = 1e18  # Largest reading; larger ones (2e18: ns since 1970) are missing
+# ISO 8601 at the beginning of a line, as pandas and most loggers write it
+_DATE: Final = re.compile(
+    r'\s*"?(\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d(?:([.,])\d+)?(?:Z|[+-]\d\d:?\d\d)?)"?(?=\s*[,;|\t])'
+)
+_PARQUETS: Final = (".parquet", ".pq")
 _KNOWN: Final = {
     b"\x1f\x8b": "must be unpacked, it is compressed",
     b"\x89HDF": "must be CSV or Parquet, it is an HDF5 file",
@@ -89,22 +96,25 @@ def read_table(path: Path, reader: Reader) -> tuple[Table, str]:
     for mark, what in _KNOWN.items():
         if data.startswith(mark):
             raise InputError(f"{where}: {what}")
-    if data[:4] in WORKBOOKS:
-        text, columns, chosen = sheet_text(data, where, MOST_BYTES)
-        refuse_large(where, columns=columns)
-        reader = dataclasses.replace(reader, delimiter="\t", decimal=reader.decimal or ".")
-        table = parsed(text, reader, where)
-        table = dataclasses.replace(table, findings=(*chosen, *table.findings))
-    elif data.startswith(b"PAR1") or path.suffix.lower() in {".parquet", ".pq"}:
-        table = _parquet(data, where)
-    else:
-        text, findings = decoded(data, where)
-        table = parsed(text, reader, where)
-        table = dataclasses.replace(table, findings=(*findings, *table.findings))
-    return table, digest
+    kind = next(read for is_of, read in READERS if is_of(data, path))
+    return kind(data, reader, where), digest
 
 
-def _parquet(data: bytes, where: str) -> Table:
+def _workbook(data: bytes, reader: Reader, where: str) -> Table:
+    """Return the table of a workbook."""
+    text, columns, chosen = sheet_text(data, where, MOST_BYTES)
+    refuse_large(where, columns=columns)
+    reader = dataclasses.replace(reader, delimiter="\t", decimal=reader.decimal or ".")
+    return parsed(text, reader, where, chosen)
+
+
+def _text(data: bytes, reader: Reader, where: str) -> Table:
+    """Return the table of a text."""
+    text, findings = decoded(data, where)
+    return parsed(text, reader, where, findings)
+
+
+def _parquet(data: bytes, reader: Reader, where: str) -> Table:  # noqa: ARG001
     """Return the table of a Parquet file."""
     try:
         return table_of(_frame(data, where), where)
@@ -191,8 +201,7 @@ def decoded(data: bytes, where: str) -> tuple[str, list[Finding]]:
         raise InputError(f"{where}: must be CSV (or other text) or Parquet, it is no text")
     if nuls:
         data = data.replace(b"\0", b"")
-        text = f"{counted(nuls, 'NUL byte')} left out"
-        findings.append(Finding("nul-bytes", text, mended=True))
+        findings.append(finding_of("nul-bytes", number=counted(nuls, "NUL byte")))
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -211,7 +220,7 @@ def refuse_large(where: str, *, columns: int = 0, size: int = 0) -> None:
         raise InputError(f"{where}: unpacks to {got}: must be at most {most}")
 
 
-def parsed(text: str, reader: Reader, where: str) -> Table:
+def parsed(text: str, reader: Reader, where: str, findings: list[Finding]) -> Table:
     """Return the table of a text; raise InputError if there are no rows of numbers."""
     every = enumerate(re.split(r"\r\n|\n|\r", text), 1)
     lines = [(k, line) for k, line in every if line.strip() and k > reader.skip_rows]
@@ -225,7 +234,7 @@ def parsed(text: str, reader: Reader, where: str) -> Table:
     # Lines that are too long are unreadable.
     lines = [(k, line if len(line) <= LONGEST_LINE else "?") for k, line in lines]
     lines, dated = without_dates(lines)
-    delimiter, decimal, width = _way(lines, reader, where)
+    delimiter, decimal, width = _form(lines, reader, where)
     cells, fits = list[str](), list[bool]()
     for _, line in lines:
         row = _row(line, delimiter, decimal, width)
@@ -233,12 +242,11 @@ def parsed(text: str, reader: Reader, where: str) -> Table:
         cells += row or ()
     columns = [cells[k::width] for k in range(width)]
     first = fits.index(True)
-    findings = []
-    if fits[-1] and not text.endswith(("\n", "\r")) and _cut(columns[-1][-21:]):
+    half = fits[-1] and not text.endswith(("\n", "\r")) and _cut(columns[-1][-21:])
+    if half:
         fits[-1] = False
         columns = [column[:-1] for column in columns]
-        text = "the last line breaks off and is left out"
-        findings.append(Finding("half-line", text, mended=True))
+        findings.append(finding_of("half-line"))
     names, headed = _header([line for _, line in lines[:first]], delimiter, width)
     if headed and len(names) != width:
         raise InputError(
@@ -246,10 +254,10 @@ def parsed(text: str, reader: Reader, where: str) -> Table:
             f" {width} with numbers; decimal commas need another delimiter, like ;"
         )
     dropped = [k for (k, _), fit in zip(lines[first:], fits[first:], strict=True) if not fit]
-    if dropped and not (findings and len(dropped) == 1):
+    if dropped and not (half and len(dropped) == 1):
         shown = listed([str(k) for k in dropped], 3)
-        said = f"{counted(len(dropped), 'line')} not rows of {width} numbers, left out"
-        findings.append(Finding("unreadable-lines", said, mended=True, where=f"line {shown}"))
+        number, where = counted(len(dropped), "line"), f"line {shown}"
+        findings.append(finding_of("unreadable-lines", where=where, lines=number, width=width))
     if dated and headed and TIME not in names:
         names = (TIME, *names[1:])
     order = np.flatnonzero(fits)
@@ -293,25 +301,25 @@ def _is_row(parts: list[str], decimal: str) -> int:
     return numbers
 
 
-def _way(lines: list[tuple[int, str]], reader: Reader, where: str) -> tuple[str, str, int]:
+def _form(lines: list[tuple[int, str]], reader: Reader, where: str) -> tuple[str, str, int]:
     """Return delimiter, decimal sign and number of columns with which most lines are rows."""
     step = max(len(lines) // SAMPLE_LINES, 1)
     # Uneven sampling, since loggers of several sensors alternate rows of each kind.
     places = [k * step + int(step * (0.618 * k % 1)) for k in range(len(lines) // step)]
     sample = [lines[k][1] for k in places]
-    found = _common(sample, reader, 2) or _common(sample, reader, 1)
-    if found == (",", ".", 2) and reader.decimal is None and _fractions(sample):
+    form = _common(sample, reader, 2) or _common(sample, reader, 1)
+    if form == (",", ".", 2) and reader.decimal is None and _fractions(sample):
         return ";", ",", 1
     least = LEAST_ROWS * len(sample)
-    if found is not None:
-        fitting = sum(_row(line, *found) is not None for line in sample)
+    if form is not None:
+        fitting = sum(_row(line, *form) is not None for line in sample)
         if fitting >= min(least, len(sample) - _HEADS):
-            return found
+            return form
     for decimal in (".", ","):
         alone = (reader.delimiter or (";" if decimal == "," else ","), decimal, 1)
         if sum(_row(line, *alone) is not None for line in sample) > least:
             return alone
-    advice = "; the delimiter can be given in [reader] of experiment.toml" if found else ""
+    advice = "; the delimiter can be given in [reader] of experiment.toml" if form else ""
     raise InputError(
         f"{where}: must be CSV with a time and an angle, got no rows of numbers{advice}"
     )
@@ -328,8 +336,8 @@ def _common(sample: list[str], reader: Reader, least: int) -> tuple[str, str, in
     """Return the most common delimiter, decimal sign and width of lines with ``least`` numbers."""
     most, best = 0, None
     quoted = any('"' in line for line in sample)
-    ways = [(reader.delimiter or sign, reader.decimal or decimal) for sign, decimal in SEPARATORS]
-    for delimiter, decimal in dict.fromkeys(ways):
+    signs = [(reader.delimiter or sign, reader.decimal or decimal) for sign, decimal in SEPARATORS]
+    for delimiter, decimal in dict.fromkeys(signs):
         if delimiter == decimal and not quoted:
             continue
         widths = Counter(
@@ -372,3 +380,31 @@ def _header(lines: list[str], delimiter: str, width: int) -> tuple[tuple[str, ..
         if known and any(above):
             names = [f"{a} [{u}]" if u else a for a, u in zip(above, units, strict=True)]
     return tuple(names), True
+
+
+def without_dates(lines: list[tuple[int, str]]) -> tuple[list[tuple[int, str]], bool]:
+    """Return lines whose dates, if most begin with one, are s since the first, and whether."""
+    dates = [_DATE.match(line) for _, line in lines]
+    if sum(date is not None for date in dates) <= LEAST_ROWS * len(lines):
+        return lines, False
+    first, seconds = None, list[tuple[int, str]]()
+    for (number, line), date in zip(lines, dates, strict=True):
+        if date is None:
+            seconds.append((number, line))
+            continue
+        try:
+            time = dt.datetime.fromisoformat(date[1].replace(",", "."))
+            first = first or time
+            since = repr((time - first) / dt.timedelta(seconds=1))
+        except (ValueError, TypeError):  # the 31st of June; dates with zones and without
+            return lines, False
+        seconds.append((number, since.replace(".", date[2] or ".") + line[date.end() :]))
+    return seconds, True
+
+
+# Kinds of files: whether a file is of a kind, and what reads it
+READERS: Final[Sequence[tuple[Callable[[bytes, Path], bool], Callable[..., Table]]]] = (
+    (lambda data, _: data[:4] in WORKBOOKS, _workbook),
+    (lambda data, path: data[:4] == b"PAR1" or path.suffix.lower() in _PARQUETS, _parquet),
+    (lambda _, __: True, _text),
+)

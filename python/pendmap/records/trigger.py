@@ -1,4 +1,4 @@
-"""Trigger channel: edges that mark releases or recur with the drive."""
+"""Rules of a trigger: edges that mark releases or recur with the drive."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ import numpy as np
 from pendmap.formatting import counted, listed
 
 if TYPE_CHECKING:
+    from pendmap.records.experiment import Finding
     from pendmap.records.work import Work
-    from pendmap.signal import Floats, Indices, Stretch
+    from pendmap.signal import Floats, Indices
 
 BETWEEN_LEVELS: Final = 0.02  # Greatest share of samples between the two levels
 DEAD_BAND: Final = 0.2  # Half-width of the hysteresis band, over the distance of the levels
@@ -67,45 +68,39 @@ def edges_of(values: Floats, edge: str | None = None) -> tuple[Indices, str] | N
 
 def _debounced(time: Floats, places: Indices, dead: float) -> list[int]:
     """Return the edges that do not follow an accepted one within ``dead``, s."""
-    kept: list[int] = []
+    accepted: list[int] = []
     for k in places.tolist():
-        if not kept or time[k] - time[kept[-1]] > dead:
-            kept.append(k)
-    return kept
+        if not accepted or time[k] - time[accepted[-1]] > dead:
+            accepted.append(k)
+    return accepted
 
 
-def after_edges(work: Work, parts: list[Stretch], period: float) -> list[Stretch]:
-    """Return the motion after each edge of the trigger; ``parts`` if it marks no release."""
-    if "trigger" not in work.extra or not parts:
-        return parts
-    found = edges_of(work.extra["trigger"], work.edge)
-    if found is None or not found[0].size:
-        work.report("trigger-unlike", f"the trigger {_none(found)}: it marks no release")
-        return parts
-    edges, edge = found
-    kept = _debounced(work.time, edges, period)
-    apart = np.diff(work.time[kept])
-    if apart.size and np.median(apart) < RELEASES_APART * period:
-        text = (
-            f"the trigger's {counted(len(kept), f'{edge} edge')} recur after"
-            f" {np.median(apart):.3g} s, three swings and less: it marks no release"
-        )
-        work.report("trigger-unlike", text)
-        return parts
+def releases(work: Work) -> Finding | None:
+    """Keep the motion after each edge of a trigger that marks releases."""
+    if not work.parts or "trigger" not in work.extra:
+        return None
+    edges = edges_of(work.extra["trigger"], work.edge)
+    if edges is None or not edges[0].size:
+        return work.finding("trigger-unlike.none", why=_none(edges))
+    places, edge = edges
+    marked = _debounced(work.time, places, work.period)
+    apart = np.diff(work.time[marked])
+    if apart.size and np.median(apart) < RELEASES_APART * work.period:
+        number = counted(len(marked), f"{edge} edge")
+        return work.finding("trigger-unlike.often", edges=number, apart=np.median(apart))
     motions = []
-    for low, high in itertools.pairwise([*kept, work.time.size]):
-        after = [(max(a, low), min(b, high)) for a, b in parts if a < high and b > low]
+    for low, high in itertools.pairwise([*marked, work.time.size]):
+        after = [(max(a, low), min(b, high)) for a, b in work.parts if a < high and b > low]
         if after:
             a, b = max(after, key=lambda part: part[1] - part[0])
             # The trigger locates the release to a sample, the angle to a fraction of a swing.
-            motions.append((low if work.time[a] - work.time[low] < period else a, b))
+            motions.append((low if work.time[a] - work.time[low] < work.period else a, b))
     if not motions:
-        work.report("trigger-unlike", "no free motion follows the trigger's edges: it is not used")
-        return parts
-    times = listed([f"{work.time[k]:.6g}" for k in kept], 6)
-    text = f"the trigger's {edge} edge marks {counted(len(kept), 'release')}, at {times} s"
-    work.report("trigger-release", text + _bounces(edges.size - len(kept)))
-    return motions
+        return work.finding("trigger-unlike.still")
+    work.parts = motions
+    times = listed([f"{work.time[k]:.6g}" for k in marked], 6)
+    number, bounces = counted(len(marked), "release"), _bounces(places.size - len(marked))
+    return work.finding("trigger-release", edge=edge, releases=number, times=times, bounces=bounces)
 
 
 def _bounces(number: int) -> str:
@@ -113,9 +108,9 @@ def _bounces(number: int) -> str:
     return f"; {counted(number, 'bounce')} left out" if number else ""
 
 
-def _none(found: tuple[Indices, str] | None) -> str:
+def _none(edges: tuple[Indices, str] | None) -> str:
     """Return the reason why there is no edge, as text."""
-    return "does not have two levels" if found is None else f"has no {found[1]} edge"
+    return "does not have two levels" if edges is None else f"has no {edges[1]} edge"
 
 
 def beat_of(time: Floats, places: Indices, omega: float | None = None) -> Beat | None:
@@ -130,10 +125,10 @@ def beat_of(time: Floats, places: Indices, omega: float | None = None) -> Beat |
         return None
     # Without a known frequency, long intervals are taken for periods, short ones for bounces.
     period = 2 * math.pi / omega if omega else float(np.quantile(np.diff(time[places]), 0.9))
-    kept = np.asarray(_debounced(time, places, BOUNCE * period), np.intp)
-    if kept.size < FEWEST_EDGES:
+    clear = np.asarray(_debounced(time, places, BOUNCE * period), np.intp)
+    if clear.size < FEWEST_EDGES:
         return None
-    before, after = time[kept - 1], time[kept]
+    before, after = time[clear - 1], time[clear]
     middle = (before + after) / 2
     apart = np.diff(middle)
     number = np.concatenate([[0.0], np.cumsum(np.round(apart / float(np.median(apart))))])
@@ -147,55 +142,63 @@ def beat_of(time: Floats, places: Indices, omega: float | None = None) -> Beat |
         return None
     error = max(spread, sampling) * math.sqrt(float(covariance[0, 0]))
     low, high = 0.0, math.inf
-    for k in range(1, kept.size):
+    for k in range(1, clear.size):
         steps = number[k:] - number[:-k]
         low = max(low, float(np.max((before[k:] - after[:-k]) / steps)))
         high = min(high, float(np.min((after[k:] - before[:-k]) / steps)))
     if low <= high:
         period, error = (low + high) / 2, (high - low) / math.sqrt(12)
     w = 2 * math.pi / period
-    return Beat(w, w * error / period, middle, max(spread, sampling), places.size - kept.size)
+    return Beat(w, w * error / period, middle, max(spread, sampling), places.size - clear.size)
 
 
-def check_drive(work: Work) -> None:
+def drive_missing(work: Work) -> Finding | None:
+    """Report a forced run without a drive."""
+    if work.free or work.plan.drive is not None or work.plan.pivot is not None:
+        return None
+    return work.finding("drive-missing")
+
+
+def drive(work: Work) -> Finding | None:
     """Report the trigger's frequency of a forced run; set the drive's phase if it is unknown."""
-    if work.plan.kind != "forced" or "trigger" not in work.extra:
-        return
-    found = edges_of(work.extra["trigger"], work.edge)
+    if "trigger" not in work.extra:
+        return None
+    edges = edges_of(work.extra["trigger"], work.edge)
     given = (work.plan.drive or {}).get("Omega")
-    beat = beat_of(work.time, found[0], given) if found else None
-    if found is None or beat is None:
-        why = f"the trigger {_none(found)}"
-        if found and found[0].size:
-            edges = counted(found[0].size, f"{found[1]} edge")
-            uneven = f"the trigger's {edges} do not recur evenly"
-            why = uneven if found[0].size >= FEWEST_EDGES else f"the trigger has {edges}"
-        work.report("trigger-unlike", f"{why}: it shows no drive")
-        return
-    said = (
-        f"by the trigger Omega = {beat.omega:.7g} +- {beat.stderr:.1g} rad/s,"
-        f" {counted(beat.time.size, f'{found[1]} edge')}{_bounces(beat.left_out)}"
-    )
+    beat = beat_of(work.time, edges[0], given) if edges else None
+    if edges is None or beat is None:
+        why = f" {_none(edges)}"
+        if edges and edges[0].size:
+            number = counted(edges[0].size, f"{edges[1]} edge")
+            uneven = f"'s {number} do not recur evenly"
+            why = uneven if edges[0].size >= FEWEST_EDGES else f" has {number}"
+        return work.finding("trigger-unlike.drive", why=why)
+    number, bounces = counted(beat.time.size, f"{edges[1]} edge"), _bounces(beat.left_out)
+    omega, error = beat.omega, beat.stderr
     if given is not None and abs(beat.omega - given) > DIFFERENT * beat.stderr:
-        work.report("trigger-differs", f"{said}: the drive is given with {given:.7g}")
-        return
-    work.report("trigger-drive", said)
+        return work.finding(
+            "trigger-differs.frequency",
+            omega=omega,
+            error=error,
+            edges=number,
+            bounces=bounces,
+            given=given,
+        )
     if given is not None and work.phase is not None:
-        _phase(work, beat, given, work.phase)
+        work.doubt = _phase(work, beat, given, work.phase)
+    return work.finding("trigger-drive", omega=omega, error=error, edges=number, bounces=bounces)
 
 
-def _phase(work: Work, beat: Beat, omega: float, phase: float) -> None:
+def _phase(work: Work, beat: Beat, omega: float, phase: float) -> Finding | None:
     """Set the drive's phase from the edges, ``phi = phase - Omega t``, or compare a given one."""
     drive = work.plan.drive or {}
     mean = np.mean(np.exp(1j * (phase - omega * beat.time)))
-    phi = float(np.angle(mean))
+    phi, given = float(np.angle(mean)), drive["phi"]
     # Edges synchronous with the sampling have a common error, which averaging does not reduce.
     error = omega * beat.error
-    told = drive["phi"]
-    if told is None:
+    if given is None:
         work.plan = dataclasses.replace(work.plan, drive={**drive, "phi": phi})
-        text = f"phi = {phi:.4g} +- {error:.1g} rad by the trigger, phase {phase:g} at its edges"
-        work.report("trigger-phase", text)
-    elif abs(math.remainder(told - phi, 2 * math.pi)) > DIFFERENT * error:
-        text = f"by the trigger phi = {phi:.4g} +- {error:.1g} rad: it is given as {told:.4g}"
-        work.report("trigger-differs", text)
+        return work.finding("trigger-phase", phi=phi, error=error, phase=phase)
+    if abs(math.remainder(given - phi, 2 * math.pi)) > DIFFERENT * error:
+        return work.finding("trigger-differs.phase", phi=phi, error=error, given=given)
+    return None

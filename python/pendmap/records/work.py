@@ -1,4 +1,4 @@
-"""Mutable record between table and run, which checks read and correct."""
+"""Mutable record between table and run, which the rules read and correct."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from pendmap.errors import InputError
 from pendmap.formatting import counted, listed
-from pendmap.records.experiment import Finding, Segment
+from pendmap.records.findings import finding_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -18,11 +18,22 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pendmap.records.description import RunPlan
+    from pendmap.records.experiment import Finding, Segment
+    from pendmap.records.periods import Periods
     from pendmap.records.rod_sensors import Accelerometer
-    from pendmap.signal import Floats, Indices, Mask
+    from pendmap.signal import Floats, Indices, Mask, Stretch
 
 FEWEST_SAMPLES = 5  # Fewest samples of a record
 _FEWEST_PEAKS = 3  # Fewest samples of a record of turning points
+
+
+@dataclasses.dataclass(frozen=True)
+class Jump:
+    """Change of the zero by ``size`` +- ``error`` rad before sample ``at``."""
+
+    at: int
+    size: float
+    error: float
 
 
 @dataclasses.dataclass
@@ -49,7 +60,13 @@ class Work:
     accelerometer: Accelerometer | None = None
     integrated: bool = False  # the angle is the integral of the velocity
     place_missing: str = ""  # missing keys of [columns] on the accelerometer's position
-    releases: list[tuple[int, int]] = dataclasses.field(default_factory=list)
+    doubt: Finding | None = None  # of a rule about its own correction
+    moves: bool = False  # whether the pendulum moves
+    periods: Periods | None = None  # periods of a free record
+    jumps: list[Jump] = dataclasses.field(default_factory=list)  # of the reading, not corrected
+    bridged: Floats = dataclasses.field(default_factory=lambda: np.empty(0))  # without outliers
+    parts: list[Stretch] = dataclasses.field(default_factory=list)  # free motions
+    releases: list[Stretch] = dataclasses.field(default_factory=list)  # parts that are used
     edge: str | None = None  # edge of the trigger that is used
     phase: float | None = None  # phase of the drive at that edge, rad
     edges: bool = False  # each reading is an edge of an encoder
@@ -66,16 +83,25 @@ class Work:
         made = self.accelerometer is not None and math.isfinite(self.accelerometer.w0)
         return self.accelerometer if made else None
 
-    def report(
+    @property
+    def on_rod(self) -> bool:
+        """Whether the angle was computed from a sensor on the rod."""
+        return self.integrated or self.angle_source is not None
+
+    @property
+    def free(self) -> bool:
+        """Whether the record is of a free motion."""
+        return self.plan.kind == "free"
+
+    def finding(
         self,
-        what: str,
-        text: str,
+        key: str,
         *,
-        mended: bool = False,
         at: Indices | None = None,
         span: tuple[float, float] | None = None,
-    ) -> None:
-        """Add a finding, at samples or over a span of time in s."""
+        **values: object,
+    ) -> Finding:
+        """Return a finding of :mod:`pendmap.records.findings`, at samples or over a span in s."""
         where = ""
         if at is not None and at.size:
             shown = listed([str(row) for row in self.rows[at[:4]]], 3)
@@ -83,8 +109,7 @@ class Work:
             span = span or (float(self.time[at[0]]), float(self.time[at[-1]]))
         if span is not None and not all(map(math.isfinite, span)):
             span = None
-        low, high = span or (None, None)
-        self.findings.append(Finding(what, text, mended, where, low, high))
+        return finding_of(key, where=where, span=span, **values)
 
     def keep(self, which: NDArray[Any]) -> None:
         """Keep the selected samples, in the given order."""
@@ -93,24 +118,24 @@ class Work:
         self.extra = {name: values[which] for name, values in self.extra.items()}
         self.pivot = {way: values[which] for way, values in self.pivot.items()}
 
-    def leave_out(self, which: Mask, what: str, noun: str, why: str) -> None:
-        """Remove samples, if any, and report their number and the reason."""
+    def leave_out(self, which: Mask, key: str, noun: str, **values: object) -> Finding | None:
+        """Remove samples, if any, and return the finding with their ``number``."""
         at = np.flatnonzero(which)
-        if at.size:
-            self.report(what, f"{counted(at.size, noun)} {why}", mended=True, at=at)
-            self.keep(~which)
+        if not at.size:
+            return None
+        finding = self.finding(key, at=at, span=None, number=counted(at.size, noun), **values)
+        self.keep(~which)
+        return finding
 
-    def distrust(self, at: Indices, what: str, text: str) -> None:
-        """Exclude samples, if any, from fits, and report them."""
-        if at.size:
-            self.trusted[at] = False
-            self.report(what, text, at=at)
+    def distrust(self, at: Indices, key: str, noun: str, **values: object) -> Finding | None:
+        """Exclude samples, if any, from fits, and return the finding with their ``number``."""
+        if not at.size:
+            return None
+        self.trusted[at] = False
+        return self.finding(key, at=at, span=None, number=counted(at.size, noun), **values)
 
     def split_by_release(self) -> tuple[list[Work], list[Finding]]:
-        """Return a record for each release, and the findings that belong to none of them.
-
-        The first includes the samples before its release, the last those after it.
-        """
+        """Return a record for each release, and the findings that belong to none of them."""
         if len(self.releases) < 2:
             return [self], []
         lows = [0, *(low for low, _ in self.releases[1:])]
@@ -118,30 +143,17 @@ class Work:
         shared, parts = list(self.findings), []
         for k, (low, high) in enumerate(zip(lows, highs, strict=True)):
             begin, end = float(self.time[low]), float(self.time[high - 1])
-            own = [f for f in shared if _within(f.from_s, f.to_s, begin, end)]
-            shared = [f for f in shared if f not in own]
+            inside = [f for f in shared if _within(f.from_s, f.to_s, begin, end)]
+            shared = [f for f in shared if f not in inside]
             part = dataclasses.replace(
                 self,
-                findings=own,
+                findings=inside,
                 segments=[s for s in self.segments if _within(s.from_s, s.to_s, begin, end)],
                 releases=[(self.releases[k][0] - low, self.releases[k][1] - low)],
             )
             part.keep(np.arange(low, high))
             parts.append(part)
         return parts, shared
-
-    def cut(self, low: float | None, high: float | None) -> None:
-        """Keep the samples from ``low`` to ``high``, s."""
-        if low is None and high is None:
-            return
-        first, last = float(self.time[0]), float(self.time[-1])
-        low, high = -math.inf if low is None else low, math.inf if high is None else high
-        self.keep((self.time >= low) & (self.time <= high))
-        if self.time.size < FEWEST_SAMPLES:
-            raise InputError(
-                f"{self.where}: from_s and to_s must be times within {first:g} to {last:g} s, they"
-                f" leave {counted(self.time.size, 'sample')}"
-            )
 
     def refuse_short(self) -> None:
         """Raise InputError if there are too few samples for a record."""

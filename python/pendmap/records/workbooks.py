@@ -8,10 +8,12 @@ import zipfile
 from typing import TYPE_CHECKING, Final
 
 from pendmap.errors import InputError
-from pendmap.records.experiment import Finding
+from pendmap.records.findings import finding_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
+
+    from pendmap.records.experiment import Finding
 
     Row = Sequence[object]
     """Values of a row's cells; None where a cell is empty."""
@@ -24,10 +26,7 @@ _EPOCH: Final = dt.datetime(1970, 1, 1)  # noqa: DTZ001 (workbooks have no time 
 
 
 def sheet_text(data: bytes, where: str, most: int) -> tuple[str, int, list[Finding]]:
-    """Return the sheet with the most numbers as text with tabs, its columns, and findings.
-
-    Raises InputError if no sheet has numbers, or if the file unpacks to more than ``most`` bytes.
-    """
+    """Return the sheet with the most numbers as text with tabs, its columns, and findings."""
     engine = WORKBOOKS[data[:4]]
     try:
         sheets = _bounded(_xlsx(data, where, most) if engine == "openpyxl" else _xls(data), where)
@@ -47,8 +46,8 @@ def sheet_text(data: bytes, where: str, most: int) -> tuple[str, int, list[Findi
     rows = sheets[name]
     filled = sorted({k for row in rows for k, cell in enumerate(row) if cell is not None})
     lines = ("\t".join(_text(row[k]) if k < len(row) else "" for k in filled) for row in rows)
-    text = f"of {len(sheets)} sheets {name!r} is read, which has most numbers"
-    findings = [Finding("sheet-chosen", text)] if len(sheets) > 1 else []
+    chosen = finding_of("sheet-chosen", number=len(sheets), sheet=name)
+    findings = [chosen] if len(sheets) > 1 else []
     return "\n".join(lines) + "\n", len(filled), findings
 
 

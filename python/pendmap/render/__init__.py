@@ -98,19 +98,21 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
         Part to draw alone, large: ``labels``, ``settle``, ``turns`` or ``exponent`` of a map,
         over draws also ``probability`` and ``entropy``; ``history``, ``energy``, ``phase`` or
         ``section`` of a trajectory; ``growth``, ``average`` or ``distribution`` of an exponent;
-        ``survival`` or ``tail`` of a lifetime; ``theta`` or ``velocity`` of a bifurcation diagram;
-        of critical curves the plane: ``omega-p`` or ``e-alpha2``; of a map over two parameters
+        ``survival`` or ``tail`` of a lifetime; ``theta``, ``velocity`` or ``sweeps`` of a
+        bifurcation; of critical curves the plane: ``omega-p`` or ``e-alpha2``; of a map
         ``kinds``, ``exponent``, ``attractors``, ``period``, ``winding``, ``undecided``, over draws
-        ``certainty``, or ``share KIND``. An unknown one is answered with those of the result.
+        ``certainty``, or ``share KIND``; of a sweep ``fraction``, ``entropy``, ``uncertainty``,
+        over two parameters ``boundary`` and ``main``. An unknown one is answered with those of the
+        result.
     size : (float, float), optional
-        Width and height in inches; by default as large as the parts need.
+        Width and height in inches, like ``8x4`` in a command; by default what the parts need.
     width : float, optional
         Width in mm, in place of ``size``: 86 is one column of most journals, 178 two. The figure is
         as high as its parts need; below 120 mm its fonts have 8 points.
     title : bool
         False: no title and subtitle, for a figure with a caption.
     dpi : float, optional
-        Pixels per inch, 200 by default.
+        Pixels per inch of a .png; by default 200.
     colormap : str or Colormap, optional
         Name of a matplotlib colour map for the map's scalar layers.
 

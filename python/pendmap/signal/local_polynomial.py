@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 
 POINTS: Final = 9  # Number of samples in a window
+_DEGREE: Final = 4  # Degree of the polynomials that give a velocity
 _EVEN: Final = 1e-3  # Offset from even spacing, in intervals, above which a window is uneven
 _BLOCK: Final = 20_000  # Number of uneven windows solved at a time
 _OUTLIER: Final = 4.5  # Size of a residual from which it is left out, standard deviations
@@ -240,15 +241,13 @@ def _solve(rows: Floats, x: Floats) -> tuple[Floats, Floats, Floats]:
     return inverse, coefficients, x - rows @ coefficients
 
 
-def smoothed_velocity(
-    time: Floats, theta: Floats, half: float, degree: int = 4
-) -> tuple[Floats, Floats]:
+def smoothed_velocity(time: Floats, theta: Floats, half: float) -> tuple[Floats, Floats]:
     """Return the velocity by local polynomials, rad/s, and its error for unit noise, 1/s.
 
     Windows reach ``half`` (s) to both sides, and more where they have too few samples.
     """
     step = float(np.median(np.diff(time)))
-    reach = max(round(half / step), degree // 2 + 2)
+    reach = max(round(half / step), _DEGREE // 2 + 2)
     width = 2 * reach + 1
     if time.size < width:
         raise ValueError(f"{time.size} samples are fewer than a window of {width}")
@@ -256,7 +255,7 @@ def smoothed_velocity(
     slope, stderr = np.empty(time.size), np.empty(time.size)
     # One set of weights serves all windows of evenly spaced samples.
     lags = np.arange(-reach, reach + 1) * (step / scale)
-    rows = lags[:, None] ** np.arange(degree + 1)
+    rows = lags[:, None] ** np.arange(_DEGREE + 1)
     normal = np.asarray(np.linalg.inv(rows.T @ rows), np.float64)
     inside = slice(reach, time.size - reach)
     slope[inside] = np.correlate(theta, rows @ normal[1], "valid") / scale
@@ -264,7 +263,7 @@ def smoothed_velocity(
     odd = np.flatnonzero(~_evenly(time, step, reach))
     for begin in range(0, odd.size, _WINDOW_BLOCK):
         some = odd[begin : begin + _WINDOW_BLOCK]
-        slope[some], stderr[some] = _slopes(time, theta, some, width, scale, degree)
+        slope[some], stderr[some] = _slopes(time, theta, some, width, scale)
     return slope, stderr
 
 
@@ -280,22 +279,22 @@ def _evenly(time: Floats, step: float, reach: int) -> Mask:
     return even
 
 
-def _slopes(  # noqa: PLR0913, PLR0917 (samples, window, form)
-    time: Floats, theta: Floats, at: Indices, width: int, scale: float, degree: int
+def _slopes(
+    time: Floats, theta: Floats, at: Indices, width: int, scale: float
 ) -> tuple[Floats, Floats]:
     """Return slopes and their errors at some samples, each from an uneven window."""
     # Samples near an end use the first or the last whole window.
     first = np.clip(at - width // 2, 0, time.size - width)
     within = first[:, None] + np.arange(width)
     s, x = (time[within] - time[at, None]) / scale, theta[within]
-    sums, moments = np.empty((at.size, 2 * degree + 1)), np.empty((at.size, degree + 1))
+    sums, moments = np.empty((at.size, 2 * _DEGREE + 1)), np.empty((at.size, _DEGREE + 1))
     power = np.ones_like(s)
-    for k in range(2 * degree + 1):
+    for k in range(2 * _DEGREE + 1):
         sums[:, k] = power.sum(axis=1)
-        if k <= degree:
+        if k <= _DEGREE:
             moments[:, k] = np.einsum("ij,ij->i", power, x)
         power *= s
-    order = np.arange(degree + 1)
+    order = np.arange(_DEGREE + 1)
     normal = np.linalg.inv(sums[:, order[:, None] + order])
     slope = np.sum(normal[:, 1, :] * moments, axis=1) / scale
     return slope, np.sqrt(np.maximum(normal[:, 1, 1], 0.0)) / scale

@@ -41,26 +41,42 @@ class Request:
     seed : int
         Seed of all draws; 0 or more.
     effects : tuple of str
-        Effects to hide: ``name``, ``name:variant`` or ``any``, with parameters as in
-        ``quadratic_drag,q=0.01``; or ``none`` alone.
+        Effects to hide, with parameters if wanted (``magnet:dipole,amplitude=0.1,d=0.2``), ``any``,
+        which the seed chooses, or ``none`` alone; by default none, hidden: any.
     size : float
         Multiplies the size of every effect that is drawn; above 0, and 1 if none is drawn.
-    w0, c_over_m, friction : float
-        The rig in SI, rad/s, 1/s, rad/s^2.
+    w0 : float
+        Natural frequency, rad/s; by default 6.0 to 6.4.
+    c_over_m : float
+        Viscous damping, 1/s; by default about 0.05, forced and hidden: 0.05 to 0.1.
+    friction : float
+        Coulomb friction Tr, rad/s^2; by default about 0.08, forced and hidden: 0.05 to 0.1.
     theta_r : float
-        The friction without dimensions, ``friction / w0**2``, in its place.
-    free, forced : int
-        Numbers of runs of each kind, at most 99 together.
+        The friction without dimensions, ``Tr / w0**2``, in its place.
+    free : int
+        Number of free decays; by default 1, forced: 0, hidden: 5.
+    forced : int
+        Number of runs under drive, at most 99 of both kinds; by default 0, forced and hidden: 4.
     duration : float
-        Length of every run, s, at most 3600.
+        Length of every run, s, at most 3600; by default until rest, forced: 30 to 40, hidden: 15 to
+        30.
     noise : float
-        Noise of the sensor, degrees.
-    rate, counts, jitter : float, int, float
-        Samples a second, Hz; counts a turn, 0 without steps; rms of the sampling instants, s.
-    correlation, dropouts, outliers : float
-        AR(1) coefficient of the noise; shares of the samples that are lost, and that are false.
+        Noise of the sensor, degrees; by default 0.1, hidden: 0.05 to 0.5.
+    rate : float
+        Samples a second, Hz.
+    counts : int
+        Counts a turn; 0: no steps.
+    correlation : float
+        AR(1) coefficient of the noise.
+    dropouts : float
+        Share of the samples that are lost.
+    outliers : float
+        Share of the samples that are false.
+    jitter : float
+        Rms deviation of the sampling instants, s.
     mess : float
-        Size of weak disturbances that no effect describes, in multiples of the noise, at most 100.
+        Size of weak disturbances beside the effects (texture of the bearing, drifting zero, slow
+        noise), in multiples of the noise, at most 100.
     plans : tuple of RunPlan
         The runs, instead of those that the preset draws, their number and their duration.
 
@@ -124,7 +140,7 @@ class Request:
 
     def _refuse_idle(self) -> None:
         """Refuse settings without effect."""
-        asked = self.effects or PRESETS[self.preset].effects
+        asked = self.effects or (PRESETS[self.preset].effect,)
         if self.size != 1 and not any(draws_size(text) for text in asked):
             raise InputError(
                 f"size must be 1 where no size of an effect is drawn, got {self.size:g}: it must "
@@ -167,28 +183,14 @@ class Request:
 
 @dataclasses.dataclass(frozen=True)
 class Run:
-    """One run: its plan, its noise-free motion and its record.
-
-    Parameters
-    ----------
-    plan : RunPlan
-        The planned run.
-    path : Path
-        Noise-free motion.
-    time, angle : array, shape (N,)
-        The record: s and rad.
-    lost : int
-        Number of samples lost from the record.
-    gap : float
-        Rms change of the reading by the effects within a second, rad, without refitted parameters.
-    """
+    """One run: its plan, its noise-free motion and its record."""
 
     plan: RunPlan
-    path: Path
-    time: Floats
-    angle: Floats
-    lost: int
-    gap: float
+    path: Path  # Noise-free motion
+    time: Floats  # The record, s, shape (N,)
+    angle: Floats  # rad, shape (N,)
+    lost: int  # Number of samples lost from the record
+    gap: float  # Rms change of the reading by the effects within a second, rad, without a refit
 
 
 @dataclasses.dataclass(frozen=True)
@@ -240,7 +242,7 @@ def make(request: Request) -> Experiment:
     if request.duration is not None:
         plans = _lasting(plans, request.duration)
     kinds = {plan.kind for plan in plans}
-    asked = list(request.effects or preset.effects)
+    asked = list(request.effects or (preset.effect,))
     effects = draw(asked, request.stream(_EFFECTS), request.size, kinds)
     readings = [effect for effect in effects if effect.group == "reading"]
     others = [effect for effect in effects if effect.group != "reading"]

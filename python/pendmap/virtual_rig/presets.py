@@ -14,30 +14,16 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True)
 class RunPlan:
-    """The initial state, duration and drive of one run.
+    """The initial state, duration and drive ``p cos(frequency t + phase)`` of one run."""
 
-    Parameters
-    ----------
-    kind : str
-        ``free`` or ``forced``.
-    theta, velocity : float
-        State when the run begins, rad and rad/s.
-    duration : float
-        Length of the record, s.
-    p, frequency, phase : float
-        The drive ``p cos(Omega t + phi)``, Omega in rad/s; ``p`` is 0 in a free run.
-    lab_time : float
-        Lab time at the start of the run, s.
-    """
-
-    kind: str
-    theta: float
-    velocity: float
-    duration: float
-    p: float = 0.0
-    frequency: float = 1.0
-    phase: float = 0.0
-    lab_time: float = 0.0
+    kind: str  # ``free`` or ``forced``
+    theta: float  # when the run begins, rad
+    velocity: float  # rad/s
+    duration: float  # of the record, s
+    p: float = 0.0  # 0 in a free run
+    frequency: float = 1.0  # rad/s
+    phase: float = 0.0  # rad
+    lab_time: float = 0.0  # when the run begins, s
 
 
 @dataclasses.dataclass(frozen=True)
@@ -47,11 +33,15 @@ class Preset:
     free: int  # number of runs
     forced: int
     duration: tuple[float, float]  # of a run, s
-    c_over_m: tuple[float, float]  # 1/s
-    friction: tuple[float, float]  # Tr, rad/s^2
     noise: tuple[float, float]  # degrees, drawn log-uniformly
-    effects: tuple[str, ...]  # hidden effects if the request names none
-    until_rest: bool = False  # a record ends a little after the pendulum has come to rest
+    effect: str  # hidden effect if the request names none
+    c_over_m: tuple[float, float] = (0.05, 0.1)  # 1/s
+    friction: tuple[float, float] = (0.05, 0.1)  # Tr, rad/s^2
+
+    @property
+    def until_rest(self) -> bool:
+        """Whether a record ends a little after the pendulum has come to rest: a single decay."""
+        return self.forced == 0
 
     def parameters(self, rng: Generator) -> Parameters:
         """Draw the parameters of the rig without effects."""
@@ -124,35 +114,10 @@ _FORCED: Final = (_swinging, _rotating, _slow, _strong)
 
 PRESETS: Final[dict[str, Preset]] = {
     # One release near pi until it rests; viscous damping and Coulomb friction.
-    "free_decay": Preset(
-        free=1,
-        forced=0,
-        duration=(120.0, 120.0),
-        c_over_m=(0.045, 0.055),
-        friction=(0.07, 0.09),
-        noise=(0.1, 0.1),
-        effects=("none",),
-        until_rest=True,
-    ),
+    "free_decay": Preset(1, 0, (120.0, 120.0), (0.1, 0.1), "none", (0.045, 0.055), (0.07, 0.09)),
     # Four runs under drive, swinging and rotating.
-    "forced": Preset(
-        free=0,
-        forced=4,
-        duration=(30.0, 40.0),
-        c_over_m=(0.05, 0.1),
-        friction=(0.05, 0.1),
-        noise=(0.1, 0.1),
-        effects=("none",),
-    ),
+    "forced": Preset(0, 4, (30.0, 40.0), (0.1, 0.1), "none"),
     # Five free and four forced runs, an effect hidden in them that the seed chooses.
-    "hidden": Preset(
-        free=5,
-        forced=4,
-        duration=(15.0, 30.0),
-        c_over_m=(0.05, 0.1),
-        friction=(0.05, 0.1),
-        noise=(0.05, 0.5),
-        effects=("any",),
-    ),
+    "hidden": Preset(5, 4, (15.0, 30.0), (0.05, 0.5), "any"),
 }
 """Presets by name."""

@@ -8,7 +8,7 @@ import importlib.metadata
 import math
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from pendmap.errors import InputError
 from pendmap.files import check_room, toml_text, whole_file, whole_folder
@@ -26,20 +26,11 @@ _GRAVITY: Final = 9.81
 _ENOUGH: Final = 3  # Least number of runs of one kind for a run to be held out
 
 
-@dataclasses.dataclass(frozen=True)
-class Places:
-    """Paths of an experiment and of its truth.
+class Places(NamedTuple):
+    """Paths of an experiment and of its truth."""
 
-    Parameters
-    ----------
-    experiment : Path
-        The folder.
-    truth : Path
-        The file next to it, ``FOLDER.truth.toml``.
-    """
-
-    experiment: Path
-    truth: Path
+    experiment: Path  # The folder
+    truth: Path  # The file next to it, ``FOLDER.truth.toml``
 
 
 def places(out: str | os.PathLike[str], *, replace: bool) -> Places:

@@ -15,7 +15,7 @@ import pytest
 import pendmap.diagnosis
 from bumpy import FILE
 from hidden import once
-from pendmap import Rig, cli
+from pendmap import cli
 from recorded import clean
 from recorded import text as csv
 
@@ -76,7 +76,7 @@ def test_json_and_a_model_that_every_command_takes(
     assert found["parameters"]["quadratic_drag.q"]["stderr"] == pytest.approx(deviation, rel=1e-9)
     assert content["provenance"]["verdict"] == "named"
     assert content["provenance"]["records"][0]["sha256"]
-    assert Rig.from_toml(path).effects[0].name == "quadratic_drag"
+    assert pendmap.load_model(path).effects[0].name == "quadratic_drag"
     moved = pendmap_command("simulate", "--model", found["model"], "--until", "5", "--json")
     assert moved.returncode == 0, moved.stderr
     # A diagnosis of the same records with the new model names nothing.
@@ -86,7 +86,7 @@ def test_json_and_a_model_that_every_command_takes(
     )
     again = pendmap.load(tmp_path / "b.nc")
     assert json.loads(more.stdout)["verdict"] == again.verdict == "none"
-    assert again.model.effects == Rig.from_toml(tmp_path / "b.toml").effects
+    assert again.model.effects == pendmap.load_model(tmp_path / "b.toml").effects
 
 
 @pytest.mark.thorough
@@ -100,7 +100,7 @@ def test_a_viscous_model_lacks_coulomb_friction(tmp_path: Path, pendmap_command:
     found = json.loads(run.stdout)
     assert [effect["name"] for effect in found["effects"]] == ["coulomb_friction"]
     assert found["verdict"] == "named"
-    model = Rig.from_toml(tmp_path / found["model"])
+    model = pendmap.load_model(tmp_path / found["model"])
     assert model.effects[0].parameters["theta_r"] == found["effects"][0]["parameters"]["theta_r"]
 
 

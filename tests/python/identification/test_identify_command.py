@@ -79,7 +79,7 @@ def test_the_whole_result_is_written_and_drawn(
     written = pendmap_command("identify", decay_file, "--out", "all.nc", "--out", "model.toml")
     assert written.stdout.rstrip().endswith("Written: model.toml, all.nc"), written.stderr
     report = pendmap.load(tmp_path / "all.nc")
-    kept = pendmap.Rig.from_toml(tmp_path / "model.toml")
+    kept = pendmap.load_model(tmp_path / "model.toml")
     assert (report.model.w0, report.model.Tr) == (kept.w0, kept.Tr)
     words = ("plot", "all.nc", "--layer", "peaks", "--width", 86, "--out", "peaks.png")
     drawn = pendmap_command(*words)

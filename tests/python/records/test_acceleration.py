@@ -160,50 +160,14 @@ def test_spikes_of_the_sensor_are_left_out(tmp_path: Path) -> None:
     assert not run.trusted[[500, 1200]].any()
 
 
-BESIDE = {
-    "agrees": (PLACE % 0.1, 1.0, "acceleration-agrees", "0.1 m: a check, not fitted"),
-    "turned": (PLACE % 0.1, -1.0, "sign-turned", "inverted to agree"),
-    "elsewhere": (PLACE % 0.15, 1.0, "acceleration-scale", "distance_m would be 0.1"),
-    "radial": ('direction = "radial", distance_m = 0.1', 1.0, "acceleration-unlike", "not used"),
-    "unplaced": ('unit = "m/s2"', 1.0, "acceleration-unused", "distance_m 0.1"),
-}
-
-
-@pytest.mark.parametrize("case", BESIDE)
-def test_an_acceleration_checks_an_angle(tmp_path: Path, case: str) -> None:
-    place, sign, key, words = BESIDE[case]
+@pytest.mark.parametrize("other", ["theta_rad", "velocity_rad_s"])
+def test_an_acceleration_is_not_used_beside_an_angle_or_a_velocity(
+    tmp_path: Path, other: str
+) -> None:
     time, theta, force = readings(release=1.2)
-    theta = theta + 1e-3 * np.random.default_rng(3).standard_normal(time.size)
-    there = experiment(
-        tmp_path,
-        f'{{ name = "acc", {place} }}',
-        time,
-        theta,
-        sign * force,
-        names="t_s,theta_rad,acc",
-    )
-    run = read(there)
-    assert words in said(run)[key], said(run)
+    values = theta if other == "theta_rad" else np.gradient(theta, time)
+    values = values + 2e-3 * np.random.default_rng(3).standard_normal(time.size)
+    names = f"t_s,{other},acc"
+    run = read(experiment(tmp_path, column(PLACE % 0.1), time, values, force, names=names))
+    assert "acceleration-unused" in said(run)
     assert run.accelerometer is None
-    assert run.acceleration is not None
-
-
-def test_a_radial_axis_and_an_angle_give_the_sensor_s_distance(tmp_path: Path) -> None:
-    time, theta, force = readings("radial", release=1.2, distance=0.2)
-    theta = theta + 1e-3 * np.random.default_rng(3).standard_normal(time.size)
-    names = "t_s,theta_rad,acc"
-    place = 'direction = "radial", distance_m = 0.2'
-    there = experiment(tmp_path, f'{{ name = "acc", {place} }}', time, theta, force, names=names)
-    assert "radial at 0.2 m: a check" in said(read(there))["acceleration-agrees"]
-    there = experiment(tmp_path, '{ name = "acc" }', time, theta, force, names=names)
-    text = said(read(there))["acceleration-unused"]
-    assert '"radial", with distance_m 0.2' in text or '"radial", with distance_m 0.19' in text
-
-
-def test_a_gyroscope_and_an_accelerometer(tmp_path: Path) -> None:
-    time, theta, force = readings(release=1.2)
-    speed = np.gradient(theta, time) + 2e-3 * np.random.default_rng(3).standard_normal(time.size)
-    names = "t_s,velocity_rad_s,acc"
-    there = experiment(tmp_path, column(PLACE % 0.1), time, speed, force, names=names)
-    found = said(read(there))
-    assert {"angle-integrated", "acceleration-agrees"} <= set(found)

@@ -16,21 +16,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-def test_degrees_become_radians(tmp_path: Path) -> None:
-    time, theta = clean()
-    run = read(tmp_path, text((time, np.degrees(theta))))
-    assert found(run)["angle-unit"].mended
-    np.testing.assert_allclose(run.theta, theta, atol=1e-6)
-
-
-def test_small_degrees_are_recognised_by_their_periods(tmp_path: Path) -> None:
-    time, theta, _ = motion(start=0.045, duration=30.0)
-    run = read(tmp_path, text((time, np.degrees(noisy(theta, 1e-4, 0)))))
-    finding = found(run)["angle-unit"]
-    assert not finding.mended
-    assert "degrees?" in finding.text
-
-
 def test_a_scale_is_estimated_from_the_periods(tmp_path: Path) -> None:
     time, theta = clean()
     said = found(read(tmp_path, text((time, 1.8 * theta))))["angle-scale"].text
@@ -48,36 +33,12 @@ def test_wrapped_turns_are_unwrapped(tmp_path: Path, low: float) -> None:
     np.testing.assert_allclose(turns, turns[0], atol=1e-5)
 
 
-@pytest.mark.parametrize("quarters", [-1, 1, 2])
-def test_a_gauge_rotated_by_quarter_turns_is_corrected(tmp_path: Path, quarters: int) -> None:
-    time, theta = clean()
-    run = read(tmp_path, text((time, theta + quarters * math.pi / 2)))
-    assert found(run)["gauge-turned"].mended
-    np.testing.assert_allclose(run.theta, theta, atol=1e-5)
-
-
 def test_missed_counts_are_located(tmp_path: Path) -> None:
     time, theta = clean()
     run = read(tmp_path, text((time, theta + 30 * COUNT * (time > 12))))
     assert found(run)["missed-counts"].where == "row 1203"
     assert run.trusted[:1200].all()
     assert not run.trusted[1201:].any()
-
-
-def test_a_slipped_turn_is_taken_back(tmp_path: Path) -> None:
-    time, theta = clean()
-    run = read(tmp_path, text((time, theta + 4 * math.pi * (time > 12))))
-    assert found(run)["turns-slipped"].mended
-    np.testing.assert_allclose(run.theta, theta, atol=1e-5)
-
-
-def test_missed_counts_of_a_fine_record_are_mended(tmp_path: Path) -> None:
-    time, theta, _ = motion(rate=1000.0, duration=12.0)
-    count = 2 * math.pi / 400
-    lost = noisy(theta, 0.002, count) + 200 * count * (time > 6)
-    description = '[rig]\nencoder_counts = 400\n[[run]]\nfile = "a.csv"\n'
-    (run,) = experiment(tmp_path, description, a=text((time, lost))).runs
-    assert "missed-counts" in found(run)
 
 
 def test_held_released_and_at_rest(tmp_path: Path) -> None:
@@ -94,45 +55,6 @@ def test_held_released_and_at_rest(tmp_path: Path) -> None:
     used = time[run.trusted]
     assert held.to_s < used[0] < 1.7
     assert used[-1] < rest.from_s
-
-
-def test_a_velocity_with_the_other_sign_is_turned(tmp_path: Path) -> None:
-    time, theta, speed = motion()
-    for factor, key in ((-1.0, "sign-turned"), (180 / math.pi, "velocity-unit")):
-        content = text((time, noisy(theta), factor * speed), "t_s,theta_rad,gyro_z")
-        run = read(tmp_path, content)
-        assert found(run)[key].mended
-        assert run.velocity is not None
-        np.testing.assert_allclose(run.velocity, speed, atol=2e-4)
-
-
-def test_a_pivot_with_the_right_sign_is_left_alone(tmp_path: Path) -> None:
-    time, theta, _ = motion(drive=(0.3, 12.0, 0.4))
-    push = 0.3 * 9.81 * np.cos(12 * time + 0.4)
-    description = '[[run]]\nfile = "a.csv"\npivot = { vertical = "acc_y" }\n'
-    content = text((time, noisy(theta), push), "t_s,theta_rad,acc_y")
-    (run,) = experiment(tmp_path, description, a=content).runs
-    assert "sign-turned" not in found(run)
-
-
-def test_a_period_unlike_the_rig_is_reported(tmp_path: Path) -> None:
-    time, theta = clean()
-    description = '[rig]\nw0 = 3.0\n[[run]]\nfile = "a.csv"\n'
-    (run,) = experiment(tmp_path, description, a=text((time, theta))).runs
-    assert "period-unlike-rig" in found(run)
-
-
-@pytest.mark.parametrize(
-    ("rig", "says"),
-    [("length_m = 250", "length_m = 250 m"), ("w0 = 6200", "w0 = 6200"), ("length_m = 0.25", "")],
-)
-def test_a_rig_in_other_units_is_reported(tmp_path: Path, rig: str, says: str) -> None:
-    described = f'[rig]\n{rig}\n[[run]]\nfile = "a.csv"\n'
-    there = experiment(tmp_path, described, a=text(clean()))
-    said = found(there.runs[0]).get("period-unlike-rig")
-    assert (said is None) == (not says)
-    assert said is None or says in said.text
-    assert there.w0 is None
 
 
 def test_a_pivot_in_millimetres_is_one_in_metres(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 
 import pendmap
 from pendmap.records.summary import as_json, as_text, doubts
-from recorded import clean, experiment, found, motion, noisy, read, text
+from recorded import clean, experiment, found, motion, read, text
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -179,15 +179,6 @@ def test_used_or_constant_columns_are_not_reported(tmp_path: Path) -> None:
     assert not {"pivot-column", "motor-column"} & set(found(run))
 
 
-@pytest.mark.parametrize("unit", [1.0, 57.29578])
-def test_a_position_whose_slope_is_the_velocity_is_the_angle(tmp_path: Path, unit: float) -> None:
-    time, theta, speed = motion()
-    content = text((time, unit * noisy(theta), speed), "time,position,velocity")
-    run = read(tmp_path, content)
-    assert run.channels["angle"] == "position"
-    assert np.abs(run.theta - theta).max() < 0.01
-
-
 def test_a_position_of_something_else_is_no_angle(tmp_path: Path) -> None:
     time, _, speed = motion()
     run = read(tmp_path, text((time, np.sin(0.7 * time), speed), "time,position,velocity"))
@@ -200,14 +191,3 @@ def test_a_position_in_a_file_with_an_angle_is_a_position(tmp_path: Path) -> Non
     run = read(tmp_path, text((time, np.sin(0.7 * time), theta), "time,position,angle"))
     assert run.channels["angle"] == "angle"
     assert run.unused == ("position",)
-
-
-@pytest.mark.parametrize("angle", [0.0, np.nan])
-@pytest.mark.parametrize("name", ["theta", "theta_rad"])
-def test_pixels_override_a_constant_angle(tmp_path: Path, angle: float, name: str) -> None:
-    time, theta = clean()
-    x, y = 640 + 300 * np.sin(theta), 200 + 300 * np.cos(theta)
-    run = read(tmp_path, text((time, x, y, 0 * time + angle), f"t_s,x,y,{name}"))
-    assert "angle" not in run.channels
-    assert found(run)["angle-constant"].mended
-    assert np.abs(run.theta - theta).max() < 0.01

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import datetime as dt
 import hashlib
-import math
 import re
 import sys
 import zipfile
@@ -79,21 +78,6 @@ def test_a_file_of_tracker_is_read(
     assert pendmap.noise_floor(run).sigma == pytest.approx(0.3 / 210, rel=0.1)
 
 
-def test_a_file_of_tracker_with_an_angle_is_read(tmp_path: Path) -> None:
-    time, theta = clean()
-    content = text((time, np.sin(theta), -np.cos(theta), np.degrees(theta)), "t,x,y,θ [°]")
-    run = read(tmp_path, "mass A,,,\n" + content)
-    assert set(run.channels) == {"time", "angle"}
-    same(run)
-
-
-def test_a_short_arc_is_reported(tmp_path: Path) -> None:
-    time, theta, _ = motion(start=0.08, rate=30.0)
-    noise = np.random.default_rng(2).normal(0, 0.5, (2, theta.size))
-    content = text((time, 100 * np.sin(theta) + noise[0], 100 * np.cos(theta) + noise[1]), "t,x,y")
-    assert "circle-uncertain" in found(read(tmp_path, content))
-
-
 def test_a_file_of_a_serial_logger_is_read(tmp_path: Path) -> None:
     time, theta = clean()
     lines = [f"{1000 * t:.0f},{a:.5f}" for t, a in zip(time, theta, strict=True)]
@@ -102,31 +86,6 @@ def test_a_file_of_a_serial_logger_is_read(tmp_path: Path) -> None:
     assert {"nul-bytes", "half-line", "columns-guessed", "time-unit"} <= set(found(run))
     assert run.time[-1] == pytest.approx(19.99)
     np.testing.assert_allclose(run.theta, theta[:-1], atol=1e-5)
-
-
-@pytest.mark.parametrize(
-    ("names", "factors"),
-    [
-        ("Time (s),Angle (rad)", (1, 1)),
-        ("t/ms,theta [deg]", (1e3, 180 / math.pi)),
-        ("time_us,angle_deg", (1e6, 180 / math.pi)),
-        ("Zeit [min],Winkel [Umdr]", None),
-        ("t in s,phi in mrad", (1, 1e3)),
-        ("Timestamp (ms),Encoder (rev)", (1e3, 0.5 / math.pi)),
-    ],
-)
-def test_units_in_column_names_are_read(
-    tmp_path: Path, names: str, factors: tuple[float, float] | None
-) -> None:
-    time, theta = clean()
-    if factors is None:
-        with pytest.raises(pendmap.InputError, match="no column of angles"):
-            read(tmp_path, text((time, theta), names))
-        return
-    run = read(tmp_path, text((time * factors[0], theta * factors[1]), names, "%.9g"))
-    same(run)
-    assert "columns-guessed" in found(run)
-    assert "angle-unit" not in found(run)
 
 
 def test_parquet_equals_text(tmp_path: Path) -> None:
@@ -271,20 +230,6 @@ def test_drives_and_pivots_are_read(tmp_path: Path) -> None:
     assert "sign-turned" in found(second)  # upward is positive, and it pulls where p is positive
 
 
-def test_peaks_alone_are_read(tmp_path: Path) -> None:
-    time = 0.5 * np.arange(30)
-    peaks = np.exp(-0.03 * time) * (-1.0) ** np.arange(30)
-    run = read(tmp_path, text((time, peaks), "t_s,peak_rad"))
-    assert run.peaks_only
-    np.testing.assert_allclose(run.theta, peaks, atol=1e-6)
-    assert math.isnan(pendmap.noise_floor(run).sigma)
-
-
-def test_a_folder_without_a_description_is_read(tmp_path: Path) -> None:
-    with pytest.raises(pendmap.InputError, match=r"has no experiment\.toml"):
-        pendmap.read_experiment(tmp_path)
-
-
 @pytest.mark.parametrize("first", [0, 1])
 @pytest.mark.parametrize("seconds", [20.0, 84.02])
 def test_every_second_row_may_be_of_another_sensor(
@@ -295,11 +240,6 @@ def test_every_second_row_may_be_of_another_sensor(
     run = read(tmp_path, text((time, theta)))
     assert run.time.size == np.isfinite(theta).sum()
     assert found(run)["angle-missing"].mended
-
-
-def test_an_angle_alone_has_no_times(tmp_path: Path) -> None:
-    with pytest.raises(pendmap.InputError, match="no column of times"):
-        read(tmp_path, text((clean()[1],), "theta_rad"))
 
 
 def test_a_pivot_without_unit_and_an_absent_drive_are_reported(tmp_path: Path) -> None:

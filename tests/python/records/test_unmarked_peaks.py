@@ -9,7 +9,7 @@ import pytest
 
 import pendmap
 from pendmap import InputError
-from recorded import experiment, found, motion, noisy, read, text
+from recorded import found, motion, noisy, read, text
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -38,21 +38,6 @@ def test_turning_points_are_recognised(tmp_path: Path, start: float, every: int)
     assert not run.trusted.any()
     with pytest.raises(InputError, match="turning points only"):
         pendmap.read_experiment(tmp_path / run.file).refuse_still([run])
-
-
-def test_declared_turning_points_are_used(tmp_path: Path) -> None:
-    time, theta = turns(1.2, 1e-3)
-    description = '[columns]\npeaks = "theta_rad"\n[[run]]\nfile = "a.csv"\n'
-    (run,) = experiment(tmp_path, description, a=text((time, theta))).runs
-    assert not found(run)
-    assert run.trusted.all()
-
-
-def test_turning_points_without_signs_are_taken_as_those_of_both_sides(tmp_path: Path) -> None:
-    time, theta = turns(1.2, 1e-3)
-    description = '[columns]\npeaks = "theta_rad"\n[[run]]\nfile = "a.csv"\n'
-    (run,) = experiment(tmp_path, description, a=text((time, np.abs(theta)))).runs
-    assert set(found(run)) == {"peaks-one-sign"}
 
 
 @pytest.mark.parametrize("rate", [3.0, 6.0, 10.0, 100.0])

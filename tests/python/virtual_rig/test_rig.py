@@ -136,13 +136,6 @@ def test_the_rig_shares_no_code_with_what_is_fitted() -> None:
     assert run.returncode == 0, run.stderr
 
 
-def test_requests_are_checked() -> None:
-    with pytest.raises(InputError, match=r"size must be .*, got nan"):
-        Request("hidden", size=math.nan)
-    with pytest.raises(InputError, match=r"noise must be .*, got inf"):
-        make(Request("hidden", noise=math.inf))
-
-
 @pytest.mark.parametrize("name", EFFECTS)
 def test_every_parameter_of_an_effect_has_bounds(name: str) -> None:
     for field in dataclasses.fields(EFFECTS[name]):

@@ -17,10 +17,7 @@ if TYPE_CHECKING:
 
 def group(title: str, example: str) -> cloup.OptionGroup:
     """Return a group of options with an example of their use."""
-    return cloup.OptionGroup(title, help=f"{EXAMPLE}{example}")
-
-
-EXAMPLE: Final = "Example: "
+    return cloup.OptionGroup(title, help=f"Example: {example}")
 
 
 MODEL: Final = group("Model", "--p 1.7 --theta-r 0.05")
@@ -32,8 +29,7 @@ RANDOM: Final = group("Random numbers", "--seed 1")
 LONG: Final = group("Long runs", "--out map.zarr --resume")
 WORKERS: Final = group("Workers", "--workers 8")
 MACHINE: Final = group("Machine", "--simd portable")
-OUTPUT: Final = group("Output", "--out figure.pdf --overwrite")
-PRINTED: Final = group("Output", "--json > result.json")
+OUTPUT: Final = group("Output", "--json > result.json")
 RECORD: Final = group("Records", "--rate 100")
 
 

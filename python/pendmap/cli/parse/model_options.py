@@ -11,9 +11,11 @@ import click
 
 from pendmap.cli.parse.groups import MODEL, SI
 from pendmap.cli.parse.options import added, option
+from pendmap.cli.parse.signature import parameters
 from pendmap.cli.parse.types import FILE, NUMBER, NUMBER_OR_RANGE, RANGE, AxisText
 from pendmap.errors import InputError
 from pendmap.model import PRESETS, Pendulum, Rig, load_model
+from pendmap.model.labels import LABELS
 from pendmap.model.quantities import check
 
 if TYPE_CHECKING:
@@ -22,20 +24,8 @@ if TYPE_CHECKING:
 
     Command = Callable[..., Any]
 
-_BARE = {
-    "gamma": "Viscous damping c/(m w0).",
-    "p": "Amplitude Y Omega^2/g of the drive.",
-    "omega": "Frequency Omega/w0 of the drive.",
-    "phase": "Phase of the drive at tau = 0, rad.",
-    "torque": "Constant torque over m l^2 w0^2, also with a model in SI.",
-    "theta_r": "Coulomb friction Tr/w0^2.",
-}
-_SI = {
-    "c_over_m": "Viscous damping c/m, 1/s.",
-    "Tr": "Coulomb friction Tr, rad/s^2.",
-    "stroke_mm": "Amplitude Y of the pivot's motion, half of its way, mm.",
-    "frequency_hz": "Frequency of the drive, Hz.",
-}
+_BARE = ("gamma", "p", "omega", "phase", "torque", "theta_r")
+_SI = ("c_over_m", "Tr", "stroke_mm", "frequency_hz")
 _SAME = {"c_over_m": "gamma", "Tr": "theta_r", "stroke_mm": "p", "frequency_hz": "omega"}
 
 
@@ -46,7 +36,7 @@ def varied_model_options(function: Command) -> Command:
     def with_ranges(**given: Any) -> Any:  # noqa: ANN401 (as the command)
         ranges: dict[str, AxisText] = {}
         for name, value in list(given.items()):
-            if name in _BARE | _SI and isinstance(value, AxisText):
+            if name in _BARE + _SI and isinstance(value, AxisText):
                 ranges[name], given[name] = value, None
             for other, span in value if name == "vary" else ():
                 if other in ranges:
@@ -87,21 +77,30 @@ def model_options(
         "Model file, without dimensions or in SI; options given in addition override it. In SI "
         "times are in s and velocities in rad/s; the options from --gamma to --theta-r have "
         "no dimensions there either.",
-        metavar="FILE.toml",
         group=SI,
     )
     preset = option(
         "--preset", click.Choice(sorted(PRESETS)), "A point of the paper's figure 2.", group=MODEL
     )
-    parameters = []
-    for name, text in (_BARE | _SI).items():
-        default = getattr(Pendulum(), name, None)
-        shown = text if default is None else f"{text}  [default: {default:g}]"
-        names = f"--{name.replace('_', '-').lower()} {name}"
-        if name not in left_out:
-            parameters.append(option(names, kind, shown, group=MODEL if name in _BARE else SI))
-    bare = len(_BARE.keys() - set(left_out))
-    return added(*parameters[:bare], preset, model, *parameters[bare:])(function)
+    declared = parameters("model.pendulum.Pendulum")
+    bare = [
+        option(_typed(name), kind, f"{text}  [default: {declared[name].default:g}]", group=MODEL)
+        for name in _BARE
+        if name not in left_out
+        for text in [declared[name].help]
+    ]
+    si = [
+        option(_typed(name), kind, f"{meaning[0].upper()}{meaning[1:]}, {unit}.", group=SI)
+        for name in _SI
+        if name not in left_out
+        for _, unit, meaning in [LABELS[name]]
+    ]
+    return added(*bare, preset, model, *si)(function)
+
+
+def _typed(name: str) -> str:
+    """Return the option of a parameter, and its name."""
+    return f"--{name.replace('_', '-').lower()} {name}"
 
 
 def model_from(given: dict[str, Any]) -> Pendulum | Rig:

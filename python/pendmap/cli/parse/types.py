@@ -7,7 +7,7 @@ import importlib
 import math
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import click
 from click.shell_completion import CompletionItem
@@ -25,7 +25,7 @@ REPORTS = (".html", ".md")  # Suffixes of reports
 _WITH_PI = re.compile(r"([+-]?)(\d*\.?\d*(?:e[+-]?\d+)?)\*?pi(?:/(\d+\.?\d*))?", re.IGNORECASE)
 
 
-class OptionType(click.ParamType[T], Generic[T]):
+class OptionType(click.ParamType[T]):
     """Type of an option, from its name and a function that reads a text or raises InputError.
 
     ``known`` returns the values that a shell completes.
@@ -76,20 +76,12 @@ def _number(text: str) -> float:
     return number
 
 
-def whole(least: int, most: int) -> OptionType[int]:
-    """Return the type of whole numbers between two bounds, both included."""
-
-    def read(text: str) -> int:
-        try:
-            number = int(text)
-        except ValueError:
-            number = least - 1
-        if not least <= number <= most:
-            wanted = f"must be a whole number from {least} to {most}"
-            raise InputError(f"{wanted}, got {short_repr(text)}")
-        return number
-
-    return OptionType("integer", read)
+def _whole(text: str) -> int:
+    """Read a whole number; the library checks its range."""
+    try:
+        return int(text)
+    except ValueError:
+        raise InputError(f"must be a whole number, got {short_repr(text)}") from None
 
 
 class AxisText(NamedTuple):
@@ -251,21 +243,18 @@ _LIBRARIES = {
 
 
 class _File(click.Path):
-    """A path, which may be written as ``file://`` and the path."""
+    """A path, which may be written as ``file://`` and the path; or the address of a store."""
 
-    def convert(self, value: Any, *words: Any) -> Any:  # noqa: ANN401 (as click)
-        """Return the path."""
-        plain = value.removeprefix("file://") if isinstance(value, str) else value
-        return super().convert(plain, *words)
-
-
-class _Result(_File):
-    """A path, or the address of a store."""
+    def __init__(self, name: str, *, address: bool = False) -> None:
+        super().__init__(path_type=Path, file_okay=name != "dir")
+        self.name, self.address = name, address
 
     def convert(self, value: Any, *words: Any) -> Any:  # noqa: ANN401 (as click)
         """Return the path or the address."""
-        path = super().convert(value, *words)
-        return Address(value) if "://" in str(value) and path == Path(value) else path
+        plain = value.removeprefix("file://") if isinstance(value, str) else value
+        if self.address and "://" in str(plain):
+            return Address(plain)
+        return super().convert(plain, *words)
 
 
 def _effects() -> Iterable[str]:
@@ -280,8 +269,10 @@ def _methods() -> Iterable[str]:
     return METHODS
 
 
-FILE = _File(path_type=Path)
-RESULT = _Result(path_type=Path)
+FILE = _File("file")
+FOLDER = _File("dir")
+RESULT = _File("file", address=True)
+INTEGER = OptionType("integer", _whole)
 NUMBER = OptionType("number", _number)
 AXIS = OptionType("A:B:N", _axis)
 RANGE = OptionType("A:B:N", _range)

@@ -1,0 +1,123 @@
+"""The rules of reading: all checks of a record, in the order in which they run.
+
+A rule is a function of the record that is being read (:class:`pendmap.records.work.Work`). It may
+correct the record, leave samples out or mark them as not for fitting. It returns a finding, which
+says what is wrong, where, what was done and what it means for errors, or None; it raises InputError
+where no record is left. A new rule is one function, in the file of its subject, and one line here.
+
+What comes before a record has lists of its own: kinds of files in ``tables.py`` (``READERS``),
+names and units of columns in ``units.py`` (``CHANNELS``).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from pendmap.records import (
+    angle,
+    clock,
+    cross_checks,
+    motion,
+    noise,
+    outliers,
+    resolution,
+    samples,
+    scale,
+    trigger,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from pendmap.records.experiment import Finding
+    from pendmap.records.work import Work
+
+    Rules = Sequence[tuple[str, Callable[[Work], Finding | None]]]
+
+# Conditions under which rules run
+WHEN: Final[Mapping[str, Callable[[Work], bool]]] = {
+    "always": lambda work: bool(work.where),
+    "sampled": lambda work: not work.peaks_only,
+    "by clock": lambda work: not work.peaks_only and not work.edges,
+    "angle": lambda work: not work.peaks_only and not work.on_rod,
+    "rate": lambda work: work.integrated,
+    "on rod": lambda work: work.on_rod,
+    "moves": lambda work: work.moves,
+    "scale": lambda work: work.moves and work.angle_source is None,
+    "driven": lambda work: work.moves and not work.free,
+}
+RULES: Final[Rules] = (
+    ("always", trigger.drive_missing),
+    # Times
+    ("always", clock.missing),
+    ("always", clock.stopped),
+    ("always", clock.wrapped),
+    ("always", clock.restarted),
+    ("always", clock.edge_stamps),
+    ("always", clock.coarse),
+    ("always", clock.backwards),
+    ("always", clock.repeated),
+    ("always", clock.unordered),
+    ("always", clock.gaps),
+    ("always", clock.jitter),
+    ("always", clock.cut),
+    ("sampled", clock.pause),
+    # Angle
+    ("always", angle.undeclared_peaks),
+    ("always", angle.turning_points),
+    ("always", angle.source_missing),
+    ("always", angle.derived),
+    ("always", angle.missing),
+    ("always", angle.huge),
+    ("sampled", angle.wrapped),
+    ("sampled", resolution.edges),
+    ("always", clock.no_clock),
+    # Readings
+    ("by clock", samples.interpolated),
+    ("angle", samples.step),
+    ("angle", samples.clipped),
+    ("rate", samples.clipped),
+    ("angle", samples.frozen),
+    ("angle", outliers.outliers),
+    ("angle", outliers.slips),
+    ("angle", outliers.jumps),
+    ("on rod", outliers.spikes),
+    ("rate", outliers.integrate_again),
+    # Units and zero
+    ("sampled", motion.moves),
+    ("scale", scale.seconds),
+    ("scale", scale.radians),
+    ("scale", scale.curvature),
+    ("scale", scale.period_of_rig),
+    ("scale", scale.sampling),
+    ("scale", scale.zero),
+    ("sampled", samples.named_step),
+    # Motion
+    ("moves", motion.free_motions),
+    ("moves", trigger.releases),
+    ("moves", motion.used_motions),
+    ("moves", motion.held_at_first),
+    ("moves", motion.rest_at_last),
+    # Other channels
+    ("driven", trigger.drive),
+    ("moves", cross_checks.velocity),
+    ("moves", cross_checks.acceleration),
+    ("driven", cross_checks.pivot_unit),
+    ("driven", cross_checks.drive_sign),
+    # What a fit can tell
+    ("moves", resolution.used_share),
+    ("moves", resolution.drive),
+    ("moves", resolution.gain),
+    ("sampled", cross_checks.pivot_steps),
+)
+# Rules of each release of a record
+OF_RELEASE: Final[Rules] = (("moves", motion.zero), ("moves", noise.grows))
+
+
+def apply(rules: Rules, work: Work) -> None:
+    """Run rules on a record, in order, and note their findings."""
+    for condition, rule in rules:
+        finding = rule(work) if WHEN[condition](work) else None
+        work.findings += [noted for noted in (finding, work.doubt) if noted is not None]
+        work.doubt = None
+    work.refuse_short()
