@@ -159,7 +159,6 @@ def test_planes_without_basins() -> None:
         ({"p": []}, {}, r"p must be an array \(N,\) of finite numbers"),
         ({"p": (0.5, 0.6, 2)}, {"grid": 0}, "grid must be a whole number"),
         ({"p": (0.5, 0.6, 2)}, {"check": 2}, "check must be"),
-        ({"p": (0.5, 0.6, 2)}, {"resume": True}, "resume must be given with a store"),
     ],
 )
 def test_refusals(ranges: dict[str, Any], more: dict[str, object], message: str) -> None:

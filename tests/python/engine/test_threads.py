@@ -67,7 +67,7 @@ def calls(folder: Path) -> dict[str, Callable[[], Any]]:
         "advance": lambda: np.asarray(pendmap.advance(MODEL, [1.0], [0.0], 3)[0]),
         "identify": lambda: str(pendmap.identify(folder / "a.csv")),
         "report": lambda: str(
-            pendmap.load(pendmap.identify(folder / "a.csv").save(file("_report.nc")))
+            pendmap.load(pendmap.save(pendmap.identify(folder / "a.csv"), file("_report.nc")))
         ),
         "noise_floor": lambda: pendmap.noise_floor(pendmap.read_experiment(folder / "a.csv")),
     }

@@ -150,10 +150,10 @@ def test_workers_that_are_gone_are_an_error_that_keeps_the_tiles(tmp_path: Path)
     store = tmp_path / "map.zarr"
 
     class Fewer:
-        """An executor that takes five tiles."""
+        """An executor that takes three tiles."""
 
         def __init__(self, executor: Executor) -> None:
-            self.left, self.executor = 5, executor
+            self.left, self.executor = 3, executor
 
         def submit(self, *call: object) -> object:
             self.left -= 1
@@ -197,5 +197,5 @@ def test_bad_input_is_refused(
 
 def test_lazy_results_are_arrays_of_dask(tmp_path: Path) -> None:
     lazy = tiled.case("basins", store=tmp_path / "map.zarr", chunks={})
-    assert lazy.label.chunks[0][:2] == (15, 15)
+    assert lazy.label.chunks[0][:2] == (20, 20)
     tiled.assert_same(lazy, tiled.plain("basins"))
