@@ -74,6 +74,7 @@ def window(pendulum: Pendulum | Rig, n: int, w: int) -> Grid:
     drive's largest acceleration.
     """
     bare, units = without_dimensions(pendulum)
+    n, w = check_whole("n", n, 1, LONGEST), check_whole("w", w, -MOST_CELLS, MOST_CELLS)
     fastest = abs(w) / n * 2 * math.pi / bare.period + 2 * math.sqrt(1 + abs(bare.p))
     cells = _CELLS * min(n, _FINER)
     reach = units.given(fastest, VELOCITY)

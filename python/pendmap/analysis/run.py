@@ -98,7 +98,8 @@ class RunOptions:
 
     def __post_init__(self) -> None:
         if self.threads is not None:
-            check_whole("threads", self.threads, 1, MOST_THREADS)
+            threads = check_whole("threads", self.threads, 1, MOST_THREADS)
+            object.__setattr__(self, "threads", threads)
         object.__setattr__(self, "seed", check_whole("seed", self.seed, 0, MOST_SEED))
         check_callable("progress", self.progress)
         if self.store is not None:

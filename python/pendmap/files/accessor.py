@@ -9,7 +9,7 @@ import xarray as xr
 
 import pendmap
 
-_ROWS: Final = {"lifetime": "start", "tongues": "critical"}
+_ROWS: Final = {"bifurcation": "entry", "lifetime": "start", "tongues": "critical"}
 """Dimension of the rows of a table, where it is not that of the first variable."""
 _SPREAD: Final = {"bound": ("low", "high"), "eigenvalue": ("1", "2"), "part": ("re", "im")}
 """Dimensions whose places become columns, and the ends of their names."""

@@ -131,6 +131,7 @@ REFUSED = {
     ("given", "text"),
     [
         ({"threads": 0}, "threads must be a whole number from 1 to 256, got 0"),
+        ({"threads": 1.5}, "threads must be a whole number from 1 to 256, got 1.5"),
         ({"seed": -1}, "seed must be a whole number from 0 to .*, got -1"),
         ({"progress": 3}, "progress must be a function of two numbers"),
     ],

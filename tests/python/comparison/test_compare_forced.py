@@ -233,7 +233,7 @@ def test_cycles_are_aligned_by_shifts_of_periods_and_turns() -> None:
     assert turning.name == "rotation 1:+1"
     assert math.isinf(turning.nearest(one)[0])
     rest = Cycle.of(1, 0, 1.0, math.pi + 0.001 * np.sin(math.tau * x))
-    assert rest.kind == "inverted rest"
+    assert rest.name == "inverted rest"
 
 
 @pytest.mark.parametrize(
