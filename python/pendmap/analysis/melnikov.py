@@ -15,7 +15,6 @@ from pendmap import _core
 from pendmap.analysis import grid, result
 from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.result import Found, Schema, summarised
-from pendmap.analysis.run import RunOptions
 from pendmap.errors import InputError, core_errors
 from pendmap.files.variables import variable
 from pendmap.model import without_dimensions
@@ -163,7 +162,7 @@ def melnikov(pendulum: Pendulum | Rig, omega: ArrayLike | None = None) -> xr.Dat
         },
     )
     values = {
-        **Numerics(RunOptions()).provenance(),
+        **Numerics().provenance(),
         "own_p": bare.p,
         "own_omega": bare.omega,
         "p_melnikov": first,

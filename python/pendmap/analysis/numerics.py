@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from typing import TYPE_CHECKING, Any, TypedDict
+from typing import Any, TypedDict
 
 from pendmap import _core
+from pendmap.analysis.run import RunOptions
 from pendmap.errors import MOST_PERIODS, check_number, check_whole, instruction_set
 from pendmap.files.variables import FORMAT_VERSION
-
-if TYPE_CHECKING:
-    from pendmap.analysis.run import RunOptions
 
 TOL = 1e-6  # Default error of a state after 5 periods; determines the step
 
@@ -29,7 +27,7 @@ class Choices(TypedDict):
 class Numerics:
     """Numerical choices of an analysis, checked on construction."""
 
-    run: RunOptions
+    run: RunOptions = dataclasses.field(default_factory=RunOptions)
     tol: float = TOL
     max_periods: int | None = None
     began: float = dataclasses.field(default_factory=time.perf_counter, init=False)

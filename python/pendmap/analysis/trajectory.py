@@ -13,7 +13,6 @@ from pendmap.analysis import result
 from pendmap.analysis.grid import ascending, starts
 from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.result import Field, Found, Schema, summarised
-from pendmap.analysis.run import RunOptions
 from pendmap.analysis.trajectories import alike, rows_of, several_facts, several_lines
 from pendmap.errors import (
     MOST_SAMPLES,
@@ -190,7 +189,7 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
     """
     bare, units = without_dimensions(pendulum)
     check_callable("live", live, "three arrays, times, angles and velocities")
-    numerics = Numerics(RunOptions(), tol)
+    numerics = Numerics(tol=tol)
     several = np.ndim(theta) > 0 or np.ndim(velocity) > 0
     angles, speeds = starts(*alike(theta, velocity)) if several else _one(theta, velocity)
     lyapunov = check_flag("lyapunov", lyapunov)

@@ -72,10 +72,8 @@ class Comparison(Saved):
     left_out: tuple[tuple[str, str], ...] = ()
 
     def __repr__(self) -> str:
-        every = self.every
-        worst = max(one.rms / one.sigma for one in every)
-        rms = f"rms up to {worst:.3g} times the noise"
-        runs = counted(len(every), "run")
+        worst = max(one.rms / one.sigma for one in self.every)
+        rms, runs = f"rms up to {worst:.3g} times the noise", counted(len(self.every), "run")
         return f"<Comparison {self.experiment.path.name}: {runs}, {rms}; {self.model.title}>"
 
     @property

@@ -21,9 +21,9 @@ _SECOND: Final = 1.0
 class ProgressBar:
     """Progress of a computation as a bar: the share done, the time passed and left.
 
-    It is an argument ``progress`` of every computation that has one. In a terminal the bar is on
-    stderr; in a notebook below the cell, a widget where ipywidgets is installed. It is not shown
-    where stderr is a file.
+    It is the ``progress`` of :class:`pendmap.RunOptions`, ``identify`` and ``diagnose``. In a
+    terminal the bar is on stderr; in a notebook below the cell, a widget where ipywidgets is
+    installed. It is not shown where stderr is a file.
 
     Parameters
     ----------
@@ -36,7 +36,8 @@ class ProgressBar:
     --------
     >>> import pendmap
     >>> bar = pendmap.ProgressBar("basins")
-    >>> result = pendmap.basins(pendmap.Pendulum(p=0.6), 20, progress=bar)
+    >>> run = pendmap.RunOptions(progress=bar)
+    >>> result = pendmap.basins(pendmap.Pendulum(p=0.6), 20, run=run)
     """
 
     def __init__(self, name: str = "", *, leave: bool = True) -> None:
