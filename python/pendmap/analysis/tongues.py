@@ -216,15 +216,15 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
         same = partial(tongues, p_max=p_max, inverted=inverted)
         first = same(pendulum, asked, plane=plane, refine=refine, run=several.first)
         return tongues_over(first, several, partial(same, omega=first["omega"]))
-    frequencies, looked, (critical, undamped, upright) = _solved(
+    frequencies, looked, (hanging, undamped, upright) = _solved(
         bare, asked, p_max, numerics, inverted=inverted, refine=refine
     )
-    if moved := bool(critical[0].moved):
-        undamped = [_NO_REST] * len(critical)
+    if moved := bool(hanging[0].moved):
+        undamped = [_NO_REST] * len(hanging)
     reach = 0.0 if moved else p_max
-    asymptotic, errors = critical_curves.asymptotic(critical, frequencies, bare.gamma, reach)
+    asymptotic, errors = critical_curves.asymptotic(hanging, frequencies, bare.gamma, reach)
     variables = {
-        **_variables(frequencies, critical, undamped, upright),
+        **_variables(frequencies, hanging, undamped, upright),
         "asked": flag("omega", np.isin(frequencies, asked), "whether the frequency was asked for"),
         "fold_sought": flag("omega", looked, "whether a fold was sought here"),
         "asymptotic": variable(("curve", "omega"), asymptotic, *_OF_P),
@@ -271,10 +271,10 @@ def _solved(  # noqa: PLR0913 (as for tongues)
         return _core.tongues(one, upright, at.tolist(), p_max, folds, numerics.run.workers, moved)
 
     def all_at(at: Floats, *, folds: bool = False) -> list[tuple[_Row, ...]]:
-        critical = solve(at, pendulum, upright=False, folds=folds)
-        undamped = solve(at, free, upright=False) if free and not critical[0].moved else critical
+        hanging = solve(at, pendulum, upright=False, folds=folds)
+        undamped = solve(at, free, upright=False) if free and not hanging[0].moved else hanging
         above = solve(at, pendulum, upright=True) if inverted else [_NO_REST] * at.size
-        return list(zip(critical, undamped, above, strict=True))
+        return list(zip(hanging, undamped, above, strict=True))
 
     def curves(rows: tuple[_Row, ...]) -> list[tuple[Floats, Floats]]:
         # The end of the search bounds the last strip.
@@ -285,21 +285,19 @@ def _solved(  # noqa: PLR0913 (as for tongues)
         if refine and asked.size > 1:
             views = [in_picture(asked, p_max, one) for one in PLANES]
             frequencies, rows = critical_curves.denser(asked, rows, all_at, curves, views)
-        critical, undamped, upright = (list(column) for column in zip(*rows, strict=True))
+        hanging, undamped, upright = (list(column) for column in zip(*rows, strict=True))
         again = partial(solve, one=pendulum, upright=False, folds=True)
-        looked = critical_curves.fold_ends(
-            frequencies, critical, np.isin(frequencies, asked), again
-        )
-    return frequencies, looked, (critical, undamped, upright)
+        looked = critical_curves.fold_ends(frequencies, hanging, np.isin(frequencies, asked), again)
+    return frequencies, looked, (hanging, undamped, upright)
 
 
 def _variables(
-    omega: Floats, critical: list[_Row], undamped: list[_Row], upright: list[_Row]
+    omega: Floats, hanging: list[_Row], undamped: list[_Row], upright: list[_Row]
 ) -> dict[str, Any]:
     """Return the tables of critical amplitudes, and the folds, at these frequencies."""
-    folds = [row.fold or (np.nan, np.nan, np.nan) for row in critical]
+    folds = [row.fold or (np.nan, np.nan, np.nan) for row in hanging]
     fold, theta, velocity = np.array(folds).T
-    first = [row.stable[0] for row in critical]
+    first = [row.stable[0] for row in hanging]
     variables: dict[str, Any] = {
         "stable_at_first": flag("omega", first, "rest below the first amplitude", _STABLE),
         "fold": variable("omega", fold, *_OF_P, "of the oscillation born at the first loss"),
@@ -307,7 +305,7 @@ def _variables(
         "fold_velocity": variable("omega", velocity, "1", "velocity dtheta/dtau of this point"),
     }
     for one, prefix, rows in (
-        ("critical", "", critical),
+        ("critical", "", hanging),
         ("undamped", "undamped_", undamped),
         ("inverted", "inverted_", upright),
     ):
@@ -343,11 +341,9 @@ def _summary(dataset: xr.Dataset) -> list[str]:
         tips = [2 / k for k in range(1, _TIPS + 1)]
         never = np.array([tip for tip in tips if omega[0] <= tip <= omega[-1]])
     if never.size:
-        frequencies = ", ".join(f"{value:.6g}" for value in never[:3])
+        omegas = ", ".join(f"{value:.6g}" for value in never[:3])
         more = f" and {never.size - 3} more" if never.size > 3 else ""  # noqa: PLR2004
-        lines.append(
-            f"{hanging.capitalize()} is unstable from p = 0 on at omega = {frequencies}{more}."
-        )
+        lines.append(f"{hanging.capitalize()} is unstable from p = 0 on at omega = {omegas}{more}.")
     elif first:
         least = min(first, key=lambda k: p[k])
         lines.append(
