@@ -1,8 +1,11 @@
-"""Numbers with their errors as text: no small value is rounded away."""
+"""Numbers with their errors as text: no small value is rounded away; names of variables."""
 
 from __future__ import annotations
 
+import ast
 import math
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import given
@@ -10,6 +13,12 @@ from hypothesis import strategies as st
 
 import pendmap
 from pendmap.formatting import columns, with_error, wrapped, written
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+PACKAGE = Path(__file__).resolve().parents[2] / "python" / "pendmap"
+VAGUE = {"found", "own", "said", "kept", "told", "each"}
 
 sizes = st.floats(-12, 6).map(lambda power: 10.0**power)
 
@@ -68,3 +77,29 @@ def test_a_wide_table_goes_on_below_with_its_first_column() -> None:
     assert said == f"name  a\nx     {'1' * 10}\n\nname  b\nx     {'2' * 10}\n"
     assert columns(["name", "a"], [["x", "1"]]) == "name  a\nx     1\n"
     assert columns(["name", "none", "a"], [["x", "", "1"]]) == "name  a\nx     1\n"
+
+
+def stored_names(tree: ast.Module) -> Iterator[tuple[int, str]]:
+    """Yield line and name of each parameter and variable, without the fields of classes."""
+    bodies = [node.body for node in ast.walk(tree) if isinstance(node, ast.ClassDef)]
+    fields = {
+        target
+        for statement in (line for body in bodies for line in body)
+        for target in ast.iter_child_nodes(statement)
+        if isinstance(statement, ast.Assign | ast.AnnAssign)
+    }
+    for node in ast.walk(tree):
+        if isinstance(node, ast.arg):
+            yield node.lineno, node.arg
+        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store) and node not in fields:
+            yield node.lineno, node.id
+
+
+def test_variables_are_named_by_what_they_hold() -> None:
+    vague = [
+        f"{path.relative_to(PACKAGE)}:{line}: {name}"
+        for path in sorted(PACKAGE.rglob("*.py"))
+        for line, name in stored_names(ast.parse(path.read_text("utf-8")))
+        if name in VAGUE
+    ]
+    assert not vague, "names must say what a variable holds:\n" + "\n".join(vague)

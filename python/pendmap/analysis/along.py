@@ -130,8 +130,8 @@ def with_stroke(model: Pendulum | Rig, axes: tuple[Varied, ...]) -> tuple[Varied
         if varies and model.Omega == 0:
             raise InputError("stroke_mm needs a frequency: Omega or frequency_hz must be given")
         return axes
-    own = next(axis for axis in axes if any(one is omega for one in axis.every))
-    apart = varies and not any(one is p for one in own.every)
+    omega_axis = next(axis for axis in axes if any(one is omega for one in axis.every))
+    apart = varies and not any(one is p for one in omega_axis.every)
     scale = {"frequency_hz": math.tau, "omega": model.w0}.get(omega.name, 1.0)
     # Over two axes p is a product: of the stroke in m, and of Omega^2 / g.
     given = np.full(omega.values.size, model.given_stroke or 0.0)
@@ -143,9 +143,9 @@ def with_stroke(model: Pendulum | Rig, axes: tuple[Varied, ...]) -> tuple[Varied
         ("" if apart else "p", bare, "p", bare, "", LABELS["p"].meaning),
         apart or not p,
     )
-    found = []
+    new_axes = []
     for axis in axes:
         first, *along = [new.get(one.parameter, one) for one in axis.every]
-        more = [Varied(*named, derived=True)] if axis is own and follows else []
-        found.append(dataclasses.replace(first, along=(*along, *more)))
-    return tuple(found)
+        more = [Varied(*named, derived=True)] if axis is omega_axis and follows else []
+        new_axes.append(dataclasses.replace(first, along=(*along, *more)))
+    return tuple(new_axes)

@@ -90,18 +90,18 @@ def uncertain_starts(raw: SimpleNamespace) -> dict[str, Any]:
 
 def boundary(dataset: xr.Dataset, raw: SimpleNamespace) -> dict[str, float | None]:
     """Return the measures of the boundary as facts, None without a boundary."""
-    found: dict[str, float | None] = {}
+    measures: dict[str, float | None] = {}
     if raw.texture.boundary_boxes:
         entropy, stderr = raw.texture.boundary_basin_entropy, raw.texture.boundary_stderr
-        found["boundary_basin_entropy"] = entropy
-        found["boundary_boxes"] = raw.texture.boundary_boxes
-        found["boundary_basin_entropy_stderr"] = stderr if math.isfinite(stderr) else None
-        found["log2_criterion"] = int(passes_log2(entropy, stderr))
+        measures["boundary_basin_entropy"] = entropy
+        measures["boundary_boxes"] = raw.texture.boundary_boxes
+        measures["boundary_basin_entropy_stderr"] = stderr if math.isfinite(stderr) else None
+        measures["log2_criterion"] = int(passes_log2(entropy, stderr))
     law = fitted_map(dataset) if "uncertainty_eps" in dataset else None
     if law is not None:
-        found["uncertainty_exponent"] = law.value
-        found["uncertainty_exponent_stderr"] = law.stderr
-        found["uncertainty_exponent_low"], found["uncertainty_exponent_high"] = law.ci95
-        found["uncertainty_eps_low"] = float(law.eps[0])
-        found["uncertainty_eps_high"] = float(law.eps[law.scales - 1])
-    return found
+        measures["uncertainty_exponent"] = law.value
+        measures["uncertainty_exponent_stderr"] = law.stderr
+        measures["uncertainty_exponent_low"], measures["uncertainty_exponent_high"] = law.ci95
+        measures["uncertainty_eps_low"] = float(law.eps[0])
+        measures["uncertainty_eps_high"] = float(law.eps[law.scales - 1])
+    return measures

@@ -227,9 +227,9 @@ def _labels(
 ) -> NDArray[np.int16]:
     """Return the labels of a tile by the numbers of the whole sweep."""
     rows = layout.rows(tile)
-    found = np.zeros((rows.stop - rows.start, *layout.shape[1:]), dtype=np.int16)
+    labels = np.zeros((rows.stop - rows.start, *layout.shape[1:]), dtype=np.int16)
     for place, label in job.labels(store, tile):
         moved = np.array([-1, 0, *(k + 1 for k in numbers[place])], dtype=np.int16)
         here = (place[0] - rows.start, *place[1:])
-        found[here] = moved[label + 1].reshape(layout.shape[-2:])
-    return found
+        labels[here] = moved[label + 1].reshape(layout.shape[-2:])
+    return labels

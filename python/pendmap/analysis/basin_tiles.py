@@ -204,16 +204,18 @@ class BasinTiles:
         first, last = self._first(tile), self._first(tile + 1)
         before = 0 if self.starts.axes else first  # starts that the plan does not have
         if step != "label":
-            found = plan.label_again(picks - before, progress)
-            own = {"label": found.label, "settle": found.settle, "turns": found.turns}
-            return Tile(pack(picks=picks, work=found.work, **own))
-        found = plan.label(first - before, last - before, progress)
-        cells: Cells = dict(zip(_CELLS, (found.label, found.settle, found.turns), strict=True))
-        if found.finite_time_exponent is not None:
-            exponent = found.finite_time_exponent * np.float32(self.rate)
+            labelled = plan.label_again(picks - before, progress)
+            arrays = {"label": labelled.label, "settle": labelled.settle, "turns": labelled.turns}
+            return Tile(pack(picks=picks, work=labelled.work, **arrays))
+        labelled = plan.label(first - before, last - before, progress)
+        cells: Cells = dict(
+            zip(_CELLS, (labelled.label, labelled.settle, labelled.turns), strict=True)
+        )
+        if labelled.finite_time_exponent is not None:
+            exponent = labelled.finite_time_exponent * np.float32(self.rate)
             cells["finite_time_exponent"] = exponent
         return Tile(
-            pack(work=found.work, undecided=np.count_nonzero(found.label == 0)), _named(cells)
+            pack(work=labelled.work, undecided=np.count_nonzero(labelled.label == 0)), _named(cells)
         )
 
     def _first(self, tile: int) -> int:
@@ -226,8 +228,8 @@ class BasinTiles:
             record = store.get(f"again-{again - 1}/{tile}")
             if record is None:
                 return np.zeros(0, np.int64)
-            found = unpack(record)
-            picks: Indices = found["picks"][found["label"] == 0]
+            arrays = unpack(record)
+            picks: Indices = arrays["picks"][arrays["label"] == 0]
             return picks
         rows = slice(tile * self.height, (tile + 1) * self.height)
         return np.flatnonzero(store.read(f"{_FOLDER}label", rows) == 0) + self._first(tile)
@@ -251,9 +253,9 @@ class BasinTiles:
         undecided = np.zeros(layout.tiles, np.int64)
         periods = 0
         for tile, record in work.each("label", "plan-0", range(layout.tiles)):
-            found = unpack(record)
-            undecided[tile] = int(found["undecided"])
-            periods += int(found["work"])
+            arrays = unpack(record)
+            undecided[tile] = int(arrays["undecided"])
+            periods += int(arrays["work"])
         moves: list[Labels] = []
         while labelled and undecided.any():
             again = len(moves) + 1
@@ -265,9 +267,9 @@ class BasinTiles:
             plan = self.plan(work.once(f"plan-{again}", further["state"].tobytes))
             tiles = np.flatnonzero(undecided).tolist()
             for tile, record in work.each(f"again-{again}", f"plan-{again}", tiles):
-                found = unpack(record)
-                undecided[tile] = np.count_nonzero(found["label"] == 0)
-                periods += int(found["work"])
+                arrays = unpack(record)
+                undecided[tile] = np.count_nonzero(arrays["label"] == 0)
+                periods += int(arrays["work"])
         measure = partial(self._measures, plan, store, layout, moves, check=check)
         measures = unpack(work.once("measures", measure))
         counts = measures.pop("counts")
@@ -323,10 +325,10 @@ class BasinTiles:
             label[label > 0] = moved[label[label > 0] - 1]
             record = store.get(f"again-{k + 1}/{tile}")
             if record is not None:
-                found = unpack(record)
-                at = found["picks"] - self._first(tile)
-                for name, own in zip(_CELLS, ("label", "settle", "turns"), strict=True):
-                    flat[name][at] = found[own]
+                arrays = unpack(record)
+                at = arrays["picks"] - self._first(tile)
+                for name, key in zip(_CELLS, ("label", "settle", "turns"), strict=True):
+                    flat[name][at] = arrays[key]
         return cells
 
     def _blocks(
@@ -356,7 +358,8 @@ class BasinTiles:
         grid, check = labelled and self.starts.axes is not None, labelled and check
         picks = plan.checked_starts() if check else np.zeros(0, np.int64)
         columns, lines = _core.thinned(row, rows), _core.thinned(rows, row)
-        own, thin = np.zeros(picks.size, np.int16), np.zeros((lines.size, columns.size), np.int16)
+        checked_labels = np.zeros(picks.size, np.int16)
+        thin = np.zeros((lines.size, columns.size), np.int16)
         counts = np.zeros(2**15 + 1, np.int64)
         settled, periods, longest, moving = 0, 0, -1, 0
         texture = _core.TextureSum(row, rows)
@@ -370,31 +373,31 @@ class BasinTiles:
             label = cells["label"].reshape(-1, row)
             counts += np.bincount(label.reshape(-1) + 1, minlength=counts.size)
             mine = (picks >= at.start * row) & (picks < at.stop * row)
-            own[mine] = label.reshape(-1)[picks[mine] - at.start * row]
+            checked_labels[mine] = label.reshape(-1)[picks[mine] - at.start * row]
             if grid:
-                kept = (lines >= at.start) & (lines < at.stop)
-                thin[kept] = label[lines[kept] - at.start][:, columns]
+                in_block = (lines >= at.start) & (lines < at.stop)
+                thin[in_block] = label[lines[in_block] - at.start][:, columns]
                 # A part of a texture ends with the first row of the next one.
                 if before.size:
                     texture.add(np.concatenate([before, label[:1]]).reshape(-1))
                 before = label
         if grid:
             texture.add(before.reshape(-1))
-        found = texture.total() if grid else _core.Texture.without_cells(labelled)
-        told = {name: getattr(found, name) for name in _TEXTURE}
+        texture_total = texture.total() if grid else _core.Texture.without_cells(labelled)
+        measures = {name: getattr(texture_total, name) for name in _TEXTURE}
         with core_errors():
             if check:
-                reliable = plan.reliability(own)
-                told |= {name: getattr(reliable, name) for name in _RELIABILITY}
+                reliable = plan.reliability(checked_labels)
+                measures |= {name: getattr(reliable, name) for name in _RELIABILITY}
                 near = plan.uncertainty(thin.reshape(-1), columns.size) if grid else None
                 if near is not None:
-                    told |= {"eps": near.eps, "uncertain": near.uncertain, "tried": near.tried}
+                    measures |= {"eps": near.eps, "uncertain": near.uncertain, "tried": near.tried}
         return pack(
             counts=counts[: 1 + max(2, np.flatnonzero(counts).max())],
             mean_settle=periods / settled if settled else -1.0,
             longest_settle=longest,
             moving=moving,
-            **{name: value for name, value in told.items() if value is not None},
+            **{name: value for name, value in measures.items() if value is not None},
         )
 
     def _renumber(self, work: Work, layout: Layout, moves: list[Labels]) -> str:
@@ -408,11 +411,11 @@ class BasinTiles:
             moves = []
         name = self._last if store.shared else _FOLDER
         if store.shared:
-            dtypes = {f"{name}{key[len(_FOLDER) :]}": each for key, each in layout.dtypes.items()}
+            dtypes = {f"{name}{key[len(_FOLDER) :]}": dtype for key, dtype in layout.dtypes.items()}
             store.create(dataclasses.replace(layout, dtypes=dtypes, step="last"))
         for tile in range(layout.tiles) if store.shared or moves else ():
             cells = self._merged(store, layout, moves, tile)
-            store.write(tile, {f"{name}{key}": own for key, own in cells.items()})
+            store.write(tile, {f"{name}{key}": values for key, values in cells.items()})
         return name
 
 

@@ -238,7 +238,7 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     rate, threads = units.given(1.0, RATE), run.tiles(1)[0]
     job = BasinTiles(bare, starts_of, choices, rate, cells, threads=threads)
     angle, speed = grid.theta, grid.velocity
-    said = f"initial velocity {units.derivative}"
+    long_name = f"initial velocity {units.derivative}"
 
     def compute(work: Work) -> tuple[xr.Dataset, list[str]]:
         raw = job.run(work, check=check)
@@ -247,7 +247,7 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
             {**cells, **uncertain_starts(raw)},
             coords={
                 **coordinate("theta", angle.centres, angle.edges, "rad", "initial angle"),
-                **coordinate("velocity", speed.centres, speed.edges, units.of_velocity, said),
+                **coordinate("velocity", speed.centres, speed.edges, units.of_velocity, long_name),
             },
         )
         return _complete(dataset, raw, pendulum, numerics), [*cells]

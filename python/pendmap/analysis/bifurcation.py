@@ -45,12 +45,12 @@ _LISTED = 12  # Largest number of branches in a summary
 def _branches(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the branches for the JSON object."""
     every = attractors_of(dataset, "kind_")
-    found = []
+    branches = []
     for k, first, last in rows(dataset, "branch_kind", "branch_first", "branch_last"):
         one = every[k]
         names = {"name": one.name, "kind": one.kind, "n": one.n, "w": one.w if one.n else None}
-        found.append(names | {"first": first, "last": last})
-    return found
+        branches.append(names | {"first": first, "last": last})
+    return branches
 
 
 SCHEMA = Schema(
@@ -168,7 +168,7 @@ def _dataset(raw: _core.Bifurcation, axis: Varied, units: Units) -> xr.Dataset:
     owner = raw.point_entry
     value = axis.values[raw.cell]
     speed = units.given(raw.point_velocity, VELOCITY)
-    ends = np.array([[own[0], own[-1]] for own in members], dtype=np.intp).reshape(-1, 2)
+    ends = np.array([[branch[0], branch[-1]] for branch in members], dtype=np.intp).reshape(-1, 2)
     loose = {
         key: np.concatenate([getattr(raw.up, key), getattr(raw.down, key)])
         for key in ("value", "theta", "velocity")
@@ -264,11 +264,11 @@ def _spans(values: Floats, where: Mask) -> str:
     """Return the three widest ranges of the marked values, as text."""
     every = [(place.start, place.stop - 1) for (place,) in find_objects(label(where)[0])]
     spans = sorted(every, key=lambda s: s[0] - s[1])[:3]
-    said = ", ".join(
+    text = ", ".join(
         f"{values[i]:.4g} to {values[j]:.4g}" if j > i else f"{values[i]:.4g}"
         for i, j in sorted(spans)
     )
-    return said + (" and less" if len(every) > len(spans) else "")
+    return text + (" and less" if len(every) > len(spans) else "")
 
 
 def _mirrored(dataset: xr.Dataset, one: int, other: int) -> bool:

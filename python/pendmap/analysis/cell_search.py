@@ -98,7 +98,7 @@ def undecided_cells(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return groups of touching cells with undecided starts, the largest first."""
     share = dataset["undecided"]
     groups, _ = label(share.values > 0, structure=np.ones((3,) * share.ndim))
-    found = []
+    regions = []
     for number, box in enumerate(find_objects(groups), 1):
         mine = groups == number
         ranges = {
@@ -106,8 +106,8 @@ def undecided_cells(dataset: xr.Dataset) -> list[dict[str, Any]]:
             for name, at in zip(reversed(share.dims), reversed(box), strict=True)
         }
         mean = float(share.values[mine].mean())
-        found.append({"ranges": ranges, "cells": int(mine.sum()), "undecided": mean})
-    return sorted(found, key=lambda one: -one["cells"])
+        regions.append({"ranges": ranges, "cells": int(mine.sum()), "undecided": mean})
+    return sorted(regions, key=lambda one: -one["cells"])
 
 
 def regimes(
@@ -135,7 +135,7 @@ def entries(raw: _core.ParameterMap, units: Units) -> dict[str, Any]:
     """Return all attractors, each with the index of its kind, over ``entry``."""
     one, rate, speed = "entry", units.of_rate, units.of_velocity
     velocity = units.given(raw.velocity, VELOCITY)
-    growth, error = (units.given(each, RATE) for each in (raw.exponent, raw.exponent_stderr))
+    growth, error = (units.given(values, RATE) for values in (raw.exponent, raw.exponent_stderr))
     place, meanings = "cell of the whole result, row by row", dict(enumerate(names(raw)))
     return {
         **described(raw.kinds, "kind", "kind_"),
@@ -155,7 +155,7 @@ def shares(
 ) -> dict[str, Any]:
     """Return the shares of undecided and failed starts, and how long chaos was followed."""
     lost, failed, watched = (
-        each.reshape(shape) for each in (raw.undecided, raw.failed, raw.chaos_periods)
+        values.reshape(shape) for values in (raw.undecided, raw.failed, raw.chaos_periods)
     )
     return {
         "undecided": variable(dims, lost, "1", "share of the starts that no attractor captured"),

@@ -53,7 +53,7 @@ _HIGHEST = 2.6  # Largest ``e`` of a figure in the plane of eq. 1.4, if it was c
 
 def denser(
     frequencies: Floats,
-    found: list[Any],
+    results: list[Any],
     solve: Callable[[Floats], list[Any]],
     curves: Callable[[Any], list[tuple[Floats, Floats]]],
     views: Sequence[Callable[[Floats, Floats], tuple[Floats, Floats]]],
@@ -64,9 +64,9 @@ def denser(
     amplitudes, ascending, the last the end of the search, and multipliers, for each model;
     ``views`` map frequencies and amplitudes to a figure that is [0, 1] wide and high.
     """
-    found = list(found)
+    results = list(results)
     for _ in range(_ROUNDS):
-        rows = [curves(one) for one in found]
+        rows = [curves(one) for one in results]
         wanted = np.zeros(frequencies.size - 1, dtype=bool)
         for view in views:
             x = view(frequencies, np.zeros_like(frequencies))[0]
@@ -83,8 +83,8 @@ def denser(
         more = solve(between)
         frequencies = np.insert(frequencies, halved + 1, between)
         for k, one in sorted(zip(halved, more, strict=True), key=lambda pair: -pair[0]):
-            found.insert(k + 1, one)
-    return frequencies, found
+            results.insert(k + 1, one)
+    return frequencies, results
 
 
 @dataclass(frozen=True)
@@ -99,14 +99,14 @@ class _Column:
     @classmethod
     def of(cls, heights: Floats, multiplier: Floats) -> Self:
         """Return a column without the two edges of a stable strip that is only a line."""
-        kept: list[int] = []
+        indices: list[int] = []
         for k, height in enumerate(heights[:-1]):
-            other = kept and multiplier[kept[-1]] == -multiplier[k]
-            if other and height - heights[kept[-1]] < _STRIP:
-                kept.pop()
+            other = indices and multiplier[indices[-1]] == -multiplier[k]
+            if other and height - heights[indices[-1]] < _STRIP:
+                indices.pop()
             else:
-                kept.append(k)
-        return cls(heights[kept], multiplier[kept], float(heights[-1]))
+                indices.append(k)
+        return cls(heights[indices], multiplier[indices], float(heights[-1]))
 
 
 def _wanted(x: Floats, columns: Sequence[_Column]) -> Mask:
@@ -134,8 +134,8 @@ def _seen_to_end(a: _Column, b: _Column) -> bool:
     extra = long.heights.size - short.heights.size
 
     def left(k: int) -> float:
-        kept = np.delete(long.heights, slice(k, k + extra))
-        return float(np.abs(kept - short.heights).sum())
+        shortened = np.delete(long.heights, slice(k, k + extra))
+        return float(np.abs(shortened - short.heights).sum())
 
     first = min(range(short.heights.size + 1), key=left)
     gone = slice(first, first + extra)
@@ -162,20 +162,20 @@ def _graded(widths: Floats, wanted: Mask) -> Indices:
 
 def fold_ends(
     omega: Floats,
-    found: list[CriticalAmplitudes],
+    rows: list[CriticalAmplitudes],
     looked: Mask,
     solve: Callable[[Floats], list[CriticalAmplitudes]],
 ) -> Mask:
     """Bisect added frequencies for the ends of folds; return where folds were sought."""
     while True:
         places = np.flatnonzero(looked)
-        folded = np.array([found[k].fold is not None for k in places])
+        folded = np.array([rows[k].fold is not None for k in places])
         change = (folded[1:] != folded[:-1]) & (np.diff(places) > 1)
         middles = ((places[:-1] + places[1:]) // 2)[change]
         if not middles.size:
             return looked
         for k, row in zip(middles, solve(omega[middles]), strict=True):
-            found[k] = row
+            rows[k] = row
         looked[middles] = True
 
 
@@ -223,9 +223,9 @@ def first_tongue_second_order(omega: Floats, gamma: float) -> Floats:
         # k^2 P^2 + (2 a k - 1/4) P + a^2 + c^2 = 0 in P = p^2: the root that is finite for k = 0.
         half = 1 / 8 - a * k
         square = (a**2 + c**2) / (half + np.sqrt(half**2 - k**2 * (a**2 + c**2)))
-        found = np.sqrt(square)
+        amplitude = np.sqrt(square)
     # Left of 2/3 the third harmonic is resonant before the first.
-    return np.where((omega > 1.0) & np.isfinite(found), found, np.nan)
+    return np.where((omega > 1.0) & np.isfinite(amplitude), amplitude, np.nan)
 
 
 def second_tongue(omega: Floats, gamma: float) -> Floats:
@@ -236,9 +236,9 @@ def second_tongue(omega: Floats, gamma: float) -> Floats:
         # s (1/2 - s) P^2 + a (1/2 - 2 s) P - (a^2 + c^2) = 0.
         leading, half = s * (0.5 - s), a * (0.5 - 2 * s) / 2
         square = (-half + np.sqrt(half**2 + leading * (a**2 + c**2))) / leading
-        found = np.sqrt(square)
+        amplitude = np.sqrt(square)
     # Left of 1/sqrt(2) the second harmonic is nearly resonant itself.
-    return np.where((omega > np.sqrt(0.5)) & np.isfinite(found), found, np.nan)
+    return np.where((omega > np.sqrt(0.5)) & np.isfinite(amplitude), amplitude, np.nan)
 
 
 CURVES: dict[str, tuple[int, Callable[[Floats, float], Floats]]] = {
@@ -250,7 +250,7 @@ CURVES: dict[str, tuple[int, Callable[[Floats, float], Floats]]] = {
 
 
 def asymptotic(
-    found: list[CriticalAmplitudes], omega: Floats, gamma: float, p_max: float
+    rows: list[CriticalAmplitudes], omega: Floats, gamma: float, p_max: float
 ) -> tuple[Floats, Floats]:
     """Return the asymptotic curves and their errors against exact ones of equal multiplier."""
     curves, errors = [], []
@@ -258,7 +258,7 @@ def asymptotic(
         p = formula(omega, gamma)
         p[p > p_max] = np.nan
         error = np.full_like(p, np.nan)
-        for k, row in enumerate(found):
+        for k, row in enumerate(rows):
             exact = [q for q, m in zip(row.p, row.multiplier, strict=True) if m == multiplier]
             if exact and np.isfinite(p[k]):
                 nearest = min(exact, key=lambda q: abs(q - p[k]))

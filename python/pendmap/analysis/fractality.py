@@ -169,11 +169,11 @@ def uncertainty_exponent(
     fewer = np.maximum.reduce(
         [_spread(uncertain.sum(axis=axis), tried.sum(axis=axis)) for axis in (1, 2)]
     )
-    found = fitted(eps, hit / fewer, all_ / fewer, "cell")
-    if found is None:
+    fit = fitted(eps, hit / fewer, all_ / fewer, "cell")
+    if fit is None:
         raise InputError("labels have no boundary at enough distances: there is no exponent")
     hit, all_ = (values.astype(np.int64) for values in (hit, all_))
-    return dataclasses.replace(found, uncertain=hit, tried=all_)
+    return dataclasses.replace(fit, uncertain=hit, tried=all_)
 
 
 def fitted(
@@ -262,9 +262,9 @@ def _on_grid(cells: Labels, periodic: tuple[bool, bool]) -> tuple[Floats, Floats
             beside = wider[top : top + height, left : left + width]
             tried &= beside > 0
             uncertain |= beside != cells
-        for found, which in zip(counts, (tried & uncertain, tried), strict=True):
+        for sums, which in zip(counts, (tried & uncertain, tried), strict=True):
             rows = np.add.reduceat(which.astype(float), strips[0], axis=0)
-            found.append(np.add.reduceat(rows, strips[1], axis=1))
+            sums.append(np.add.reduceat(rows, strips[1], axis=1))
     return steps.astype(float), np.array(counts[0]), np.array(counts[1])
 
 
@@ -288,10 +288,10 @@ def _of_map(dataset: xr.Dataset) -> UncertaintyExponent:
             "this is a part of a map, and the counts of uncertain starts are of the whole: it must "
             "be the whole map, or labels on a grid, dataset['label']"
         )
-    found = fitted_map(dataset)
-    if found is None:
+    fit = fitted_map(dataset)
+    if fit is None:
         raise InputError("too few starts of this map are uncertain: there is no exponent")
-    return found
+    return fit
 
 
 @dataclasses.dataclass(frozen=True)
@@ -371,13 +371,13 @@ def basin_entropy(labels: npt.ArrayLike | xr.Dataset) -> BasinEntropy:
     cells = _numbered(labels)
     texture = _core.TextureSum(cells.shape[1], cells.shape[0])
     texture.add(np.ascontiguousarray(cells).ravel())
-    found = texture.total()
+    measures = texture.total()
     return BasinEntropy(
-        value=found.basin_entropy,
-        boundary=found.boundary_basin_entropy,
-        boundary_stderr=found.boundary_stderr,
-        boxes=found.boxes,
-        boundary_boxes=found.boundary_boxes,
+        value=measures.basin_entropy,
+        boundary=measures.boundary_basin_entropy,
+        boundary_stderr=measures.boundary_stderr,
+        boxes=measures.boxes,
+        boundary_boxes=measures.boundary_boxes,
     )
 
 

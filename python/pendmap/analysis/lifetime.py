@@ -218,76 +218,76 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
     job = BasinTiles(bare, states, choices, rate, cells, part_of_result=False, threads=threads)
 
     def compute(work: Work) -> tuple[xr.Dataset, list[str]]:
-        found = ends_of_list(job, work, speeds, pendulum, numerics, check=False)
-        return _complete(found, pendulum, numerics, from_period, window), []
+        basin_map = ends_of_list(job, work, speeds, pendulum, numerics, check=False)
+        return _complete(basin_map, pendulum, numerics, from_period, window), []
 
     return run.complete("lifetime", pendulum, request, job, compute)
 
 
 def _complete(
-    found: xr.Dataset,
+    basin_map: xr.Dataset,
     pendulum: Pendulum | Rig,
     numerics: Numerics,
     from_period: int | None,
     window: str,
 ) -> xr.Dataset:
-    """Return the lifetimes of the starts that end as ``found``."""
+    """Return the lifetimes of the starts that end as in ``basin_map``."""
     bare, units = without_dimensions(pendulum)
-    label = found["label"].values.astype(np.int64)
-    settle = found["settle_periods"].values.astype(np.int64)
+    label = basin_map["label"].values.astype(np.int64)
+    settle = basin_map["settle_periods"].values.astype(np.int64)
     times = settle[settle >= 0]
-    bound, censored = int(found.attrs["max_periods"]), int((label == 0).sum())
+    bound, censored = int(basin_map.attrs["max_periods"]), int((label == 0).sum())
     fitted = None
-    if times.size and found.attrs["plane"] == "basins":
+    if times.size and basin_map.attrs["plane"] == "basins":
         if from_period is None:
             fitted = survival.begin(times, censored, bound)
         elif from_period < bound:
             fitted = survival.tail(times, censored, bound, from_period)
             fitted = fitted if fitted.captured else None
-    saddle = survival.growth_on_saddle(found, fitted, bare, numerics.run.workers)
-    dataset = found.drop_dims("start").assign(
+    saddle = survival.growth_on_saddle(basin_map, fitted, bare, numerics.run.workers)
+    dataset = basin_map.drop_dims("start").assign(
         {
-            **_curves(found, times, censored, bound),
-            **{name: found[name] for name in ("start_theta", "start_velocity", "label")},
+            **_curves(basin_map, times, censored, bound),
+            **{name: basin_map[name] for name in ("start_theta", "start_velocity", "label")},
             "capture_period": variable(
                 "start", settle.astype(np.int32), "periods", "capture", "-1: never", missing=-1
             ),
         }
     )
     values = {
-        **facts(found),
+        **facts(basin_map),
         **numerics.provenance(),
-        **_measures(found, fitted, saddle, bare, units),
+        **_measures(basin_map, fitted, saddle, bare, units),
         "starts": label.size,
         "captured": int(times.size),
         "censored": censored,
         "failed": int((label < 0).sum()),
-        "chaotic_share": _chaotic(found),
+        "chaotic_share": _chaotic(basin_map),
         "from_period_given": int(from_period is not None),
     }
     SCHEMA.complete(dataset, pendulum, values)
-    lines = summary_of(dataset, found)
+    lines = summary_of(dataset, basin_map)
     if window:
         lines.append(f"Starts are drawn in {window}.")
     result.summarised(dataset, lines, pendulum, "these lifetimes are")
     return dataset
 
 
-def _chaotic(found: xr.Dataset) -> float:
+def _chaotic(basin_map: xr.Dataset) -> float:
     """Return the share of the starts that end on a chaotic attractor."""
-    return float(found["fraction"].values[chaotic(found)].sum())
+    return float(basin_map["fraction"].values[chaotic(basin_map)].sum())
 
 
 def _curves(
-    found: xr.Dataset, times: NDArray[np.int64], censored: int, bound: int
+    basin_map: xr.Dataset, times: NDArray[np.int64], censored: int, bound: int
 ) -> dict[str, Any]:
     """Return captures up to each period by each attractor, and tails from all beginnings."""
-    label, settle = found["label"].values, found["settle_periods"].values
+    label, settle = basin_map["label"].values, basin_map["settle_periods"].values
     last = bound if censored else int(times.max(initial=0)) + 1
     elapsed = np.unique(np.linspace(0, last, min(last, _STORED) + 1).round().astype(np.int64))
     by = [
         np.searchsorted(np.sort(settle[(label == k) & (settle >= 0)]), elapsed, side="right")
-        for k in found["id"].values
+        for k in basin_map["id"].values
     ]
     captured = np.array(by, dtype=np.int64).reshape(len(by), elapsed.size)
     tails = survival.residual(times, censored, bound) if times.size else []
@@ -306,7 +306,7 @@ def _curves(
 
 
 def _measures(
-    found: xr.Dataset,
+    basin_map: xr.Dataset,
     fitted: survival.Tail | None,
     saddle: tuple[float, float, int],
     pendulum: Pendulum,
@@ -315,7 +315,7 @@ def _measures(
     """Return the measures of the tail, the saddle or persistent chaos as facts."""
     period = pendulum.period
     growth, error, followed = saddle
-    persistent = found.sizes["attractor"] > 0 and math.isclose(_chaotic(found), 1.0)
+    persistent = basin_map.sizes["attractor"] > 0 and math.isclose(_chaotic(basin_map), 1.0)
     chaotic, rate = False, math.nan
     if fitted is not None:
         # The fraction 1/mean leaves in each period.
@@ -325,9 +325,9 @@ def _measures(
     exponent, exponent_error = growth / period, error / period
     dimension = math.nan
     if persistent:
-        largest = int(np.argmax(found["exponent"].values))
-        exponent = units.bare(float(found["exponent"].values[largest]), RATE)
-        exponent_error = units.bare(float(found["exponent_stderr"].values[largest]), RATE)
+        largest = int(np.argmax(basin_map["exponent"].values))
+        exponent = units.bare(float(basin_map["exponent"].values[largest]), RATE)
+        exponent_error = units.bare(float(basin_map["exponent_stderr"].values[largest]), RATE)
     elif chaotic and not pendulum.theta_r and not pendulum.effects:
         dimension = (growth - rate) * (1 / growth + 1 / (growth + pendulum.gamma * period))
     return {
@@ -364,7 +364,7 @@ def lifetime_over(dataset: xr.Dataset, draws: Draws, analysis: Analysis) -> xr.D
     mean, error, transient, persistent = np.array(rows).T
     _, _, low, high = interval(mean)
     lives, share = "mean lifetime of transient chaos", "share of the draws that"
-    found = dataset.assign(
+    with_draws = dataset.assign(
         drawn_mean_periods=variable("draw", mean, "periods", lives),
         drawn_stderr=variable("draw", error, "periods", f"standard error of the {lives}"),
         drawn_persistent=flag("draw", persistent, "whether chaos persists"),
@@ -373,4 +373,4 @@ def lifetime_over(dataset: xr.Dataset, draws: Draws, analysis: Analysis) -> xr.D
         transient_share=variable((), transient.mean(), "1", f"{share} have transient chaos"),
         persistent_share=variable((), persistent.mean(), "1", f"{share} have persistent chaos"),
     )
-    return draws.complete(found, summary_of_draws(facts(found)))
+    return draws.complete(with_draws, summary_of_draws(facts(with_draws)))

@@ -16,42 +16,42 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-def summary_of(dataset: xr.Dataset, found: xr.Dataset) -> list[str]:
-    """Return the lines about the lifetimes ``dataset`` of the starts of the map ``found``."""
+def summary_of(dataset: xr.Dataset, basin_map: xr.Dataset) -> list[str]:
+    """Return the lines about the lifetimes ``dataset`` of the starts of the map ``basin_map``."""
     a = facts(dataset)
     units = Units.of(a)
     lines: list[str] = []
     exponent = f"{with_error(a['chaos_exponent'], a['chaos_exponent_stderr'])} {units.per_time}"
     if a["persistent"]:
         lines.append(
-            f"Persistent: {_shares(found)}; largest exponent {exponent}; none of the "
+            f"Persistent: {_shares(basin_map)}; largest exponent {exponent}; none of the "
             f"trajectories followed was captured within {a['chaos_bound']} periods."
         )
-    elif found.attrs["plane"] == "conservative":
+    elif basin_map.attrs["plane"] == "conservative":
         lines.append("Without damping (gamma = 0) there are no attractors: no lifetime.")
     elif a["transient_chaos"]:
         lines += _of_tail(dataset, exponent)
     else:
         lines.append(_why_not(dataset, exponent))
     if a["chaotic_share"] and not a["persistent"]:
-        names = found["attractor"].values[chaotic(found)]
+        names = basin_map["attractor"].values[chaotic(basin_map)]
         lines.append(
             f"{100 * a['chaotic_share']:.3g} % of the starts end on {', '.join(names)}, and are "
             f"left out: chaos there was not captured within {a['chaos_bound']} periods."
         )
-    if a["censored"] and found.attrs["plane"] == "basins":
+    if a["censored"] and basin_map.attrs["plane"] == "basins":
         lines.append(
             f"{counted(a['censored'], 'start')} of {a['starts']} were alive at the bound of "
             f"{counted(a['max_periods'], 'period')}."
         )
     if a["captured_starts"]:
-        lines.append(f"Ended on {_shares(found)}.")
+        lines.append(f"Ended on {_shares(basin_map)}.")
     return [*lines, f"{counted(a['starts'], 'start')}, {effort(a)}"]
 
 
-def _shares(found: xr.Dataset) -> str:
+def _shares(basin_map: xr.Dataset) -> str:
     """Return the attractors with the share of the starts that each captures, as text."""
-    rows = zip(found["attractor"].values, found["fraction"].values, strict=True)
+    rows = zip(basin_map["attractor"].values, basin_map["fraction"].values, strict=True)
     return ", ".join(f"{name} {100 * float(share):.2f} %" for name, share in rows)
 
 
@@ -60,12 +60,12 @@ def _of_tail(dataset: xr.Dataset, exponent: str) -> list[str]:
     units = Units.of(a)
     clock = units.seconds(f"{a['mean_time']:.4g}") if units.si else f"tau = {a['mean_time']:.4g}"
     mean = with_error(a["mean_periods"], a["mean_periods_stderr"])
-    said = (
+    sentence = (
         f"Transient chaos lives for {mean} periods on average ({clock}): the tail of "
         f"{counted(a['tail_captured'], 'capture')} after period "
         f"{a['from_period']}."
     )
-    lines = [said]
+    lines = [sentence]
     tests = min(a["tail_weibull"], a["tail_steady"])
     if tests < survival.LEVEL:
         lines.append(

@@ -171,12 +171,12 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
     with core_errors():
         start = theta, units.bare(velocity, VELOCITY)
         raw = _core.lyapunov(bare, start, choices, run.progress)
-    found, members = raw.attractor, raw.ensemble
+    attractor, members = raw.attractor, raw.ensemble
     growth = np.empty((0, 0)) if members is None else members.growth
     exponent, stderr, regular = _value(raw, bare.period)
     dataset = xr.Dataset(
         {
-            **orbit_table.table([] if found is None else [found], units, "attractor"),
+            **orbit_table.table([] if attractor is None else [attractor], units, "attractor"),
             **_growth(raw, growth, bare.period, units),
         }
     )
@@ -221,16 +221,16 @@ def _second(
     raw: _core.Lyapunov, exponent: float, pendulum: Pendulum, units: Units
 ) -> dict[str, Any]:
     """Return the second exponent, the sum of both, and the Kaplan-Yorke dimension."""
-    own = raw.attractor
+    attractor = raw.attractor
     if raw.ensemble is not None and raw.end in {"chaotic", "undamped"}:
         total, error = raw.ensemble.sum
         total += 0.0  # no minus zero
         second, dimension = total - exponent, math.nan
         if raw.end == "chaotic" and second < 0 < exponent:
             dimension = 1 + exponent / abs(second)
-    elif own is not None and own.n is not None and len(own.multipliers) > 1:
-        sizes = [math.hypot(*pair) for pair in own.multipliers]
-        period, error = own.n * pendulum.period, 0.0
+    elif attractor is not None and attractor.n is not None and len(attractor.multipliers) > 1:
+        sizes = [math.hypot(*pair) for pair in attractor.multipliers]
+        period, error = attractor.n * pendulum.period, 0.0
         second = math.log(sizes[1]) / period if sizes[1] else -math.inf
         total, dimension = exponent + second, 0.0
     else:
@@ -282,12 +282,12 @@ def _summary(dataset: xr.Dataset) -> list[str]:
     value, per = a["largest_exponent"], units.per_time
     if math.isfinite(value) and a["end"] in {"chaotic", "undamped"}:
         known = math.isfinite(a["largest_exponent_stderr"])
-        each, whole = (
+        exponent_error, whole = (
             f" +- {a[f'{key}_stderr']:.2g}" if known else ""
             for key in ("largest_exponent", "per_period")
         )
         lines.append(
-            f"Largest Lyapunov exponent {value:.6g}{each} {per}, "
+            f"Largest Lyapunov exponent {value:.6g}{exponent_error} {per}, "
             f"{a['per_period']:.6g}{whole} per period: mean over "
             f"{a['trajectories']} trajectories of "
             f"{counted(a['periods'], 'period')} each, {a['dropped_periods']} more dropped before."
@@ -323,18 +323,18 @@ def _ended(dataset: xr.Dataset, name: str) -> list[str]:
     speed = units.spoken(format(a["velocity0"], "g"))
     start = f"From theta = {a['theta0']:g} rad, velocity = {speed}"
     if a["end"] == "captured":
-        said = f"{start}: {name}, reached after {counted(a['transient_periods'], 'period')}."
+        text = f"{start}: {name}, reached after {counted(a['transient_periods'], 'period')}."
         grown = float(dataset["growth"].values[: a["transient_periods"] + 1].max())
         if grown > _BY_ROUNDING:
-            said += (
+            text += (
                 f" On the way deviations grow by 1e{grown / math.log(10):.0f}: rounding decides "
                 "when it is reached, and which one where others coexist."
             )
         if a["largest_exponent"] == -math.inf:
-            said += " Its exponent is minus infinity: both multipliers are 0."
+            text += " Its exponent is minus infinity: both multipliers are 0."
         elif math.isnan(a["largest_exponent"]):
-            said += " Friction holds it permanently: deviations neither grow nor decay, and there"
-            said += " is no exponent."
+            text += " Friction holds it permanently: deviations neither grow nor decay, and there"
+            text += " is no exponent."
     else:
         words = {
             "chaotic": f": {name}; none of the trajectories of the search was captured within"
@@ -346,12 +346,12 @@ def _ended(dataset: xr.Dataset, name: str) -> list[str]:
             " this bound.",
             "failed": ": the motion leaves the range of numbers; there is no exponent.",
         }
-        said = start + words[a["end"]]
+        text = start + words[a["end"]]
     if not a["lost"]:
-        return [said]
+        return [text]
     lost = f"{a['lost']} of {a['trajectories']} trajectories"
     return [
-        said,
+        text,
         f"The chaos is a transient: {lost} settled. The analysis lifetime estimates its duration.",
     ]
 

@@ -245,14 +245,16 @@ def _greatest(work: Floats) -> float:
     return float(top - (after - before) ** 2 / (8 * bend) if bend else top)
 
 
-def _summary(pendulum: Pendulum, own: dict[str, float], first: float, sense: str) -> list[str]:
+def _summary(
+    pendulum: Pendulum, thresholds: dict[str, float], first: float, sense: str
+) -> list[str]:
     where = f"at omega = {pendulum.omega:g}"
-    known = {name: p for name, p in own.items() if math.isfinite(p)}
+    known = {name: p for name, p in thresholds.items() if math.isfinite(p)}
     apart = {name: p for name, p in known.items() if name != "loop"}
     lines = []
     if sense:
         lines.append(f"The torque sustains the rotation {sense} and is included in the potential.")
-    elif "loop" in own:
+    elif "loop" in thresholds:
         lines.append("The torque does not exceed the losses of a turn: both are perturbations.")
     if sense and "loop" in known:
         lines.append(
@@ -260,9 +262,9 @@ def _summary(pendulum: Pendulum, own: dict[str, float], first: float, sense: str
             "(Melnikov, first order)."
         )
     if sense and apart:
-        said = ", ".join(f"{name} from p = {p:.9g}" for name, p in apart.items())
+        text = ", ".join(f"{name} from p = {p:.9g}" for name, p in apart.items())
         lines.append(
-            f"Manifolds of neighbouring upright rests cross {said} on (heteroclinic, the torque "
+            f"Manifolds of neighbouring upright rests cross {text} on (heteroclinic, the torque "
             "too to first order)."
         )
     elif len(apart) > 1 and np.ptp(list(apart.values())) <= _LINEAR * first:
@@ -279,10 +281,10 @@ def _summary(pendulum: Pendulum, own: dict[str, float], first: float, sense: str
             "On the homoclinic loop of upright rest under the torque they begin at p = "
             f"{known['loop']:.9g}."
         )
-    if hidden := [name for name in own if name not in known]:
+    if hidden := [name for name in thresholds if name not in known]:
         names = " and ".join(hidden)
         lines.append(f"No threshold {where} ({names}): the drive's work is below rounding errors.")
-    if own.get("loop", first) == 0:
+    if thresholds.get("loop", first) == 0:
         return [*lines, "Without damping there are no attractors and no basins."]
     if first > 0 and pendulum.p:
         ratio = abs(pendulum.p) / first

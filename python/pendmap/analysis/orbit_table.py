@@ -97,7 +97,7 @@ def chaotic(dataset: xr.Dataset) -> Mask:
 
 def objects(dataset: xr.Dataset, one: str, *more: str) -> list[dict[str, Any]]:
     """Return the orbits of a :func:`table` over ``one`` for JSON, with ``more`` variables."""
-    found = records(
+    orbits = records(
         dataset,
         id="id",
         name=one,
@@ -114,13 +114,13 @@ def objects(dataset: xr.Dataset, one: str, *more: str) -> list[dict[str, Any]]:
         twin="twin",
         **{name: name for name in more if name in dataset},  # files of earlier versions lack some
     )
-    for own, points in zip(found, points_of(dataset, one), strict=True):
-        own["points"] = points.tolist()
-        if own["n"] <= 0:  # chaos
-            own["n"] = own["w"] = own["points"] = None
-        own["multipliers"] = [p for p in own["multipliers"] if not math.isnan(p[0])] or None
-        own["twin"] = own["twin"] or None
-    return found
+    for orbit, points in zip(orbits, points_of(dataset, one), strict=True):
+        orbit["points"] = points.tolist()
+        if orbit["n"] <= 0:  # chaos
+            orbit["n"] = orbit["w"] = orbit["points"] = None
+        orbit["multipliers"] = [p for p in orbit["multipliers"] if not math.isnan(p[0])] or None
+        orbit["twin"] = orbit["twin"] or None
+    return orbits
 
 
 def points_of(dataset: xr.Dataset, one: str) -> list[Floats]:
@@ -143,16 +143,16 @@ def matched(
     Of the others the nearest pairs come first, those apart by less than ``reach`` of their numbers;
     0 where they are not alike. Return whether no orbit leads there, distance, and both numbers.
     """
-    found = [(False, _apart(old[k], new[m], circle=circle), k, m) for k, m in continued]
-    taken = {k for _, _, k, _ in found}, {m for *_, m in found}
+    pairs = [(False, _apart(old[k], new[m], circle=circle), k, m) for k, m in continued]
+    taken = {k for _, _, k, _ in pairs}, {m for *_, m in pairs}
     both = itertools.product(range(len(old)), range(len(new)))
     free = [(k, m) for k, m in both if k not in taken[0] and m not in taken[1] and reach(k, m)]
     for far, k, m in sorted((_apart(old[k], new[m], circle=circle), k, m) for k, m in free):
         if k not in taken[0] and m not in taken[1] and far < reach(k, m):
             taken[0].add(k)
             taken[1].add(m)
-            found.append((True, far, k, m))
-    return found
+            pairs.append((True, far, k, m))
+    return pairs
 
 
 def named_alike(

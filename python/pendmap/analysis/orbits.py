@@ -38,8 +38,8 @@ _LISTED = 12  # Largest number of orbits in a summary
 
 def _orbits(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the orbits for the JSON object."""
-    found = objects(dataset, "orbit", "stable", "residual")
-    return [own | {"stable": bool(own["stable"])} for own in found]
+    entries = objects(dataset, "orbit", "stable", "residual")
+    return [entry | {"stable": bool(entry["stable"])} for entry in entries]
 
 
 @drawn_field
@@ -155,12 +155,12 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
         box = grid.bare(units)
         raw = _core.orbits(bare, (n, w), *box, run.workers, run.progress)
         paths = _paths(bare, raw.orbits, units)
-    found = raw.orbits
-    residual = np.array([o.residual for o in found], dtype=float)
+    orbits = raw.orbits
+    residual = np.array([o.residual for o in orbits], dtype=float)
     dataset = xr.Dataset(
         {
-            **table(found, units, "orbit"),
-            "stable": flag("orbit", [o.stable for o in found], "whether it is stable"),
+            **table(orbits, units, "orbit"),
+            "stable": flag("orbit", [o.stable for o in orbits], "whether it is stable"),
             "residual": variable("orbit", residual, "1", "distance that remains after a period"),
             **paths,
         }
@@ -177,10 +177,10 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
     return dataset
 
 
-def _paths(pendulum: Pendulum, found: list[_core.Orbit], units: Units) -> dict[str, Any]:
+def _paths(pendulum: Pendulum, orbits: list[_core.Orbit], units: Units) -> dict[str, Any]:
     """Return the motion along each orbit, integrated from each of its points to limit errors."""
     pieces = []
-    for number, orbit in enumerate(found, start=1):
+    for number, orbit in enumerate(orbits, start=1):
         period = orbit.period or pendulum.period
         length = period / len(orbit.points)
         samples = max(1, round(_SAMPLES * pendulum.period / length))
@@ -188,8 +188,8 @@ def _paths(pendulum: Pendulum, found: list[_core.Orbit], units: Units) -> dict[s
             continue
         for k, point in enumerate(orbit.points):
             run = _core.simulate(pendulum, point, length, _TOLERANCE, samples, lyapunov=False)
-            own = (np.full(run.time.size, x, dtype=np.int32) for x in (number, k))
-            pieces.append((*own, run.theta, units.given(run.velocity, VELOCITY)))
+            numbers = (np.full(run.time.size, x, dtype=np.int32) for x in (number, k))
+            pieces.append((*numbers, run.theta, units.given(run.velocity, VELOCITY)))
     empty = tuple(np.empty(0, dtype=t) for t in (np.int32, np.int32, float, float))
     columns = [np.concatenate(c) for c in zip(*(pieces or [empty]), strict=True)]
     return {
@@ -205,13 +205,13 @@ def _summary(dataset: xr.Dataset, pendulum: Pendulum, *, friction: bool) -> list
     units = Units.of(a)
     stable = int(dataset["stable"].sum())
     count = dataset.sizes["orbit"]
-    own = f"period {a['n']} and {counted(abs(a['w']), 'net turn')}"
-    own += f" {'forward' if a['w'] > 0 else 'backward'}" if a["w"] else ""
-    lines = [f"{counted(count, 'orbit') if count else 'No orbit'} of {own}, {stable} stable."]
+    sought = f"period {a['n']} and {counted(abs(a['w']), 'net turn')}"
+    sought += f" {'forward' if a['w'] > 0 else 'backward'}" if a["w"] else ""
+    lines = [f"{counted(count, 'orbit') if count else 'No orbit'} of {sought}, {stable} stable."]
     for k in range(min(count, _LISTED)):
         row = dataset.isel(orbit=k)
         pairs = [complex(*pair) for pair in row["multipliers"].values if pair[0] == pair[0]]
-        said = ", ".join(_written(value) for value in pairs)
+        multipliers = ", ".join(_written(value) for value in pairs)
         speed = units.spoken(format(float(row["velocity_point"]), ".9g"))
         period = ""
         if pendulum.p == 0 and a["w"]:
@@ -219,7 +219,7 @@ def _summary(dataset: xr.Dataset, pendulum: Pendulum, *, friction: bool) -> list
         lines.append(
             f"{row['orbit'].values}: {'stable' if int(row['stable']) else 'unstable'}, "
             f"theta = {float(row['theta_point']):.9g} rad, velocity = {speed}, "
-            f"{'multipliers' if len(pairs) > 1 else 'multiplier'} {said}{period}."
+            f"{'multipliers' if len(pairs) > 1 else 'multiplier'} {multipliers}{period}."
         )
     if count > _LISTED:
         lines.append(f"{count - _LISTED} more are in the result.")
@@ -277,15 +277,15 @@ def orbits_over(dataset: xr.Dataset, draws: Draws, analysis: Analysis) -> xr.Dat
             away = theirs[j] - point
             away[:, 0] = np.remainder(away[:, 0] + math.pi, math.tau) - math.pi
             state[k, :, d] = point + away[np.argmin(np.hypot(*away.T))]
-            own, pair = dataset["multipliers"].values[k], one["multipliers"].values[j]
-            swapped = np.abs(pair[::-1] - own).sum() < np.abs(pair - own).sum()
+            of_model, pair = dataset["multipliers"].values[k], one["multipliers"].values[j]
+            swapped = np.abs(pair[::-1] - of_model).sum() < np.abs(pair - of_model).sum()
             multipliers[k, ..., d] = pair[::-1] if swapped else pair
     spread = interval(state)[1]
     dims, speed = dataset["multipliers"].dims, dataset["velocity_point"].attrs["units"]
-    single, each, part = "orbit", ("orbit", "draw"), dataset["multipliers"].attrs["long_name"]
+    single, per_draw, part = "orbit", ("orbit", "draw"), dataset["multipliers"].attrs["long_name"]
     of = "standard deviation over the draws of"
-    found = dataset.assign(
-        **result.point(each, state[:, 0], state[:, 1], speed, "drawn_{}"),
+    with_draws = dataset.assign(
+        **result.point(per_draw, state[:, 0], state[:, 1], speed, "drawn_{}"),
         drawn_multipliers=variable((*dims, "draw"), multipliers, "1", part),
         theta_spread=variable(single, spread[:, 0], "rad", f"{of} the angle"),
         velocity_spread=variable(single, spread[:, 1], speed, f"{of} the velocity"),
@@ -294,23 +294,23 @@ def orbits_over(dataset: xr.Dataset, draws: Draws, analysis: Analysis) -> xr.Dat
         stable_share=variable(single, stable.mean(axis=1), "1", "share in which it is stable"),
         drawn_others=variable((), others / total, "1", "orbits of a draw that the model lacks"),
     )
-    return draws.complete(found, _drawn_summary(found, others))
+    return draws.complete(with_draws, _drawn_summary(with_draws, others))
 
 
-def _drawn_summary(found: xr.Dataset, others: int) -> list[str]:
+def _drawn_summary(dataset: xr.Dataset, others: int) -> list[str]:
     lines = []
-    for k, name in enumerate(found["orbit"].values):
+    for k, name in enumerate(dataset["orbit"].values):
         theta, velocity = (
-            with_error(float(found[f"{what}_point"][k]), float(found[f"{what}_spread"][k]))
+            with_error(float(dataset[f"{what}_point"][k]), float(dataset[f"{what}_spread"][k]))
             for what in ("theta", "velocity")
         )
-        sizes = np.hypot(*np.moveaxis(found["drawn_multipliers"].values[k], 1, 0))
+        sizes = np.hypot(*np.moveaxis(dataset["drawn_multipliers"].values[k], 1, 0))
         mean, error, _, _ = interval(sizes.max(axis=0))
         largest = f", largest multiplier {with_error(float(mean), float(error))} in size"
         lines.append(
-            f"{name}: there in {100 * float(found['exists'][k]):.3g} % of the draws, stable in "
-            f"{100 * float(found['stable_share'][k]):.3g} %; theta = {theta}, velocity = {velocity}"
-            f"{largest if math.isfinite(mean) else ''}."
+            f"{name}: there in {100 * float(dataset['exists'][k]):.3g} % of the draws, stable in "
+            f"{100 * float(dataset['stable_share'][k]):.3g} %; theta = {theta}, "
+            f"velocity = {velocity}{largest if math.isfinite(mean) else ''}."
         )
     if others:
         more = counted(others, "orbit")

@@ -299,15 +299,19 @@ def _curves(
     low, high = omega.bare[0] - half, omega.bare[-1] + half
     p_max = float(p.bare[-1] + (np.diff(p.bare)[0] / 2 if p.bare.size > 1 else 0.0))
     frequency = np.linspace(max(low, omega.bare[0] / 2), high, _FREQUENCIES)
-    found = tongues(model, frequency, p_max, inverted=False, refine=True, run=run)
-    scale, sought = omega.values[-1] / omega.bare[-1], found["fold_sought"]
+    curves = tongues(model, frequency, p_max, inverted=False, refine=True, run=run)
+    scale, sought = omega.values[-1] / omega.bare[-1], curves["fold_sought"]
     return {
-        "curve_omega": ("curve_frequency", scale * found["omega"].values, omega.attributes),
-        "curve_fold": ("curve_frequency", found["fold"].values, p.attributes),
+        "curve_omega": ("curve_frequency", scale * curves["omega"].values, omega.attributes),
+        "curve_fold": ("curve_frequency", curves["fold"].values, p.attributes),
         "curve_fold_sought": ("curve_frequency", sought.values, sought.attrs),
-        "curve_index": ("curve_point", found["index"].values, found["index"].attrs),
-        "curve_p": ("curve_point", found["p"].values, p.attributes),
-        "curve_multiplier": ("curve_point", found["multiplier"].values, found["multiplier"].attrs),
+        "curve_index": ("curve_point", curves["index"].values, curves["index"].attrs),
+        "curve_p": ("curve_point", curves["p"].values, p.attributes),
+        "curve_multiplier": (
+            "curve_point",
+            curves["multiplier"].values,
+            curves["multiplier"].attrs,
+        ),
     }
 
 
@@ -327,8 +331,8 @@ def _summary(dataset: xr.Dataset) -> list[str]:
         f"{name} = {dataset[name].values[0]:g} to {dataset[name].values[-1]:g}"
         for name in (a["columns"], a["rows"])
     ]
-    said = f"{counted(a['cells'], 'cell')}, {counted(count, 'regime')}."
-    lines = [f"{', '.join(spans)}: {said}"]
+    counts = f"{counted(a['cells'], 'cell')}, {counted(count, 'regime')}."
+    lines = [f"{', '.join(spans)}: {counts}"]
     shares = dataset["regime_share"].values[:_LISTED]
     lines += [f"{100 * share:.3g} %: {', '.join(kinds[k])}." for k, share in enumerate(shares)]
     if count > _LISTED:
@@ -365,27 +369,27 @@ def regimes_over(dataset: xr.Dataset, draws: Draws, analysis: Analysis) -> xr.Da
     ranks: dict[str, tuple[int, ...]] = {}
     for one in draws.each(analysis):
         ranks |= {kind.pair: kind.rank for kind in attractors_of(one, "kind_")}
-        own = [tuple(kinds) for kinds in sets(one)]
-        shares.append(dict(zip(own, one["regime_share"].values.tolist(), strict=True)))
-        for k, kinds in enumerate(own):
+        regimes = [tuple(kinds) for kinds in sets(one)]
+        shares.append(dict(zip(regimes, one["regime_share"].values.tolist(), strict=True)))
+        for k, kinds in enumerate(regimes):
             counts.setdefault(kinds, np.zeros(shape, np.uint16))[one["regime"].values == k] += 1
     share = np.array([[one.get(kinds, 0.0) for one in shares] for kinds in counts])
     order = np.argsort(-share.mean(axis=1), kind="stable")
     every = sorted(set().union(*counts) - {cell_search.UNDECIDED}, key=ranks.__getitem__)
     ranked = [list(counts)[k] for k in order]
     probability = np.stack(list(counts.values()))[order].astype(np.float32) / len(draws)
-    found = dataset.assign(outcome_has=having("outcome", ranked, every))
+    with_draws = dataset.assign(outcome_has=having("outcome", ranked, every))
     names = np.array(every, dtype=str)
-    found = found.assign_coords(
+    with_draws = with_draws.assign_coords(
         outcome_kind=variable("outcome_kind", names, long_name="kind of attractor")
     )
-    found = found.assign(outcomes(dims, probability, share[order]))
-    return draws.complete(found, _drawn_summary(found))
+    with_draws = with_draws.assign(outcomes(dims, probability, share[order]))
+    return draws.complete(with_draws, _drawn_summary(with_draws))
 
 
-def _drawn_summary(found: xr.Dataset) -> list[str]:
+def _drawn_summary(dataset: xr.Dataset) -> list[str]:
     lines = []
-    every = list(_outcomes(found))
+    every = list(_outcomes(dataset))
     for kinds, (mean, low, high) in every[:_LISTED]:
         lines.append(
             f"{', '.join(kinds)}: {100 * mean:.3g} % of the cells, 95 % of the draws in "
@@ -393,4 +397,4 @@ def _drawn_summary(found: xr.Dataset) -> list[str]:
         )
     if len(every) > _LISTED:
         lines.append(f"{len(every) - _LISTED} more regimes are in the result.")
-    return [*lines, sure_line(found, "a regime")]
+    return [*lines, sure_line(dataset, "a regime")]

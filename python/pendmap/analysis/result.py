@@ -139,8 +139,8 @@ class Schema:
                 value = operator.attrgetter(field.core or field.name)(raw)
             if value is not None:
                 field.put(dataset, value, model.units)
-        own = {n: x for n, x in known.items() if n in LABELS and n not in replaced}
-        self.describe(dataset, own)
+        fixed = {n: x for n, x in known.items() if n in LABELS and n not in replaced}
+        self.describe(dataset, fixed)
         dataset.attrs["history"] = history_of(dataset)
 
     def describe(self, dataset: xr.Dataset, parameters: Mapping[str, Any]) -> None:

@@ -202,8 +202,8 @@ class RunOptions:
         before, now = (_flat(one) for one in (old, mark))
         for key in sorted({*before, *now}):
             if before.get(key) != now.get(key):
-                said, given = (short_repr(one.get(key)) for one in (before, now))
-                raise InputError(f"{address}: was begun with {key} = {said}, not {given}")
+                stored, given = (short_repr(one.get(key)) for one in (before, now))
+                raise InputError(f"{address}: was begun with {key} = {stored}, not {given}")
         if old["rounding"] != mark["rounding"]:
             raise InputError(
                 f"{address}: was begun with an instruction set that rounds otherwise "

@@ -109,11 +109,11 @@ def unlimited_rotation(pendulum: Pendulum) -> list[str]:
 def _dry(pendulum: Pendulum) -> tuple[float, float]:
     """Return dry friction and torque; nan if other damping acts."""
     kinds = {effect.name for effect in pendulum.effects if effect.brakes}
-    own = {"viscous_damping": "gamma", "coulomb_friction": "theta_r", "bias_torque": "torque"}
-    added = dict.fromkeys(own.values(), 0.0)
+    fields = {"viscous_damping": "gamma", "coulomb_friction": "theta_r", "bias_torque": "torque"}
+    added = dict.fromkeys(fields.values(), 0.0)
     for effect in pendulum.effects:
-        if effect.name in own:
-            added[own[effect.name]] = next(iter(effect.parameters.values()))
+        if effect.name in fields:
+            added[fields[effect.name]] = next(iter(effect.parameters.values()))
     gamma, friction, torque = (
         getattr(pendulum, name) + added[name] for name in ("gamma", "theta_r", "torque")
     )
@@ -142,8 +142,8 @@ def window_said(theta: tuple[float, ...], velocity: tuple[float, ...], units: Un
     )
     (low, high), (slow, fast) = theta, velocity
     speeds = units.spoken(f"{slow:.6g} to {fast:.6g}")
-    said = f" (the default window{', to 3 w0' if units.si else ''})" if default else ""
-    return f"theta = {low:.6g} to {high:.6g} rad, velocity = {speeds}{said}"
+    note = f" (the default window{', to 3 w0' if units.si else ''})" if default else ""
+    return f"theta = {low:.6g} to {high:.6g} rad, velocity = {speeds}{note}"
 
 
 def box_said(attrs: Mapping[Any, Any]) -> str:
@@ -182,8 +182,8 @@ def _attractors(dataset: xr.Dataset) -> list[str]:
         value = f"exponent {with_error(exponent, spread)}{unit}"
         rate = value if math.isfinite(exponent) else "held by friction"
         bound = bound_said(share, starts)
-        said = f"{100 * share:.2f}" + ("" if bound else f" +- {100 * error:.2f}")
-        lines.append(f"{names[k]}: {said} % of the starts{bound}, {rate}{mirror}.")
+        percentage = f"{100 * share:.2f}" + ("" if bound else f" +- {100 * error:.2f}")
+        lines.append(f"{names[k]}: {percentage} % of the starts{bound}, {rate}{mirror}.")
     if len(lines) > 1:
         lines.append("These shares are the basin stability in this window.")
     if not lines:
@@ -204,12 +204,12 @@ def _settling(dataset: xr.Dataset) -> list[str]:
     a = facts(dataset)
     if a["longest_settle"] < 0:
         return []
-    own, units = "", Units.of(a)
+    note, units = "", Units.of(a)
     if not is_driven(a["p"], effects_of(a)):
         time = f" = {units.given(math.tau, TIME):.4g} s" if units.si else ""
-        own = f" (without drive a period is {units.own_period}{time})"
+        note = f" (without drive a period is {units.own_period}{time})"
     times = f"{a['mean_settle']:.1f} periods on average, {a['longest_settle']} at most"
-    return [f"Settling takes {times}{own}."]
+    return [f"Settling takes {times}{note}."]
 
 
 def _boundary(attrs: Mapping[Any, Any]) -> list[str]:

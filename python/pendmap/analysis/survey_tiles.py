@@ -69,9 +69,9 @@ class SurveyTiles:
         with core_errors():
             if step == _SEARCH:
                 return Tile(_GAINED[True] + survey.search(tile, progress=progress))
-            found = survey.exchange(number, tile, inputs, progress=progress)
-            gained = survey.gained(number, tile, found or inputs[tile])
-        return Tile(_GAINED[gained] + (found or b""))
+            exchanged = survey.exchange(number, tile, inputs, progress=progress)
+            gained = survey.gained(number, tile, exchanged or inputs[tile])
+        return Tile(_GAINED[gained] + (exchanged or b""))
 
     def run(self, work: Work, run: RunOptions) -> tuple[_core.Survey, list[bytes]]:
         """Compute the blocks that are missing; return the survey and the last result of each."""
@@ -110,5 +110,5 @@ def _found(store: Store, number: int, block: int) -> bytes:
 @functools.lru_cache(maxsize=2)
 def _restored(job: bytes, state: bytes) -> _core.Survey:
     """Return the survey of a job, made once in each process."""
-    found: SurveyTiles = pickle.loads(job)  # noqa: S301 (of this process)
-    return found.survey(state)
+    tiles: SurveyTiles = pickle.loads(job)  # noqa: S301 (of this process)
+    return tiles.survey(state)

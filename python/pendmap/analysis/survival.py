@@ -71,9 +71,9 @@ def tail(times: Times, censored: int, bound: int, start: int) -> Tail:
     Maximum likelihood: the mean is the sum of all times beyond ``start``, censored ones included,
     over the number of captures (Cox & Oakes 1984, Analysis of Survival Data, sections 3.2 and 3.3).
     """
-    own = times[times > start] - start
-    count, left = own.size, bound - start
-    total = float(own.sum()) + censored * left
+    lives = times[times > start] - start
+    count, left = lives.size, bound - start
+    total = float(lives.sum()) + censored * left
     if count == 0:
         return Tail(start, math.inf, math.inf, 0, censored, math.nan, math.nan)
     mean = total / count
@@ -83,8 +83,8 @@ def tail(times: Times, censored: int, bound: int, start: int) -> Tail:
         mean / math.sqrt(count),
         count,
         censored,
-        _weibull(own, censored, left),
-        _steady(own, censored, left, count / total),
+        _weibull(lives, censored, left),
+        _steady(lives, censored, left, count / total),
     )
 
 
@@ -109,7 +109,7 @@ def begin(times: Times, censored: int, bound: int) -> Tail | None:
 def residual(times: Times, censored: int, bound: int) -> list[Tail]:
     """Return the tails from all beginnings; their means are constant in an exponential tail."""
     tails = (tail(times, censored, bound, start) for start in _beginnings(times))
-    return [each for each in tails if each.captured >= LEAST // 4]
+    return [fit for fit in tails if fit.captured >= LEAST // 4]
 
 
 def _beginnings(times: Times) -> Iterator[int]:
@@ -119,9 +119,9 @@ def _beginnings(times: Times) -> Iterator[int]:
         start = max(start + 1, round(start * _GROWTH))
 
 
-def _weibull(own: Times, censored: int, left: int) -> float:
+def _weibull(lives: Times, censored: int, left: int) -> float:
     """Return the p-value of ``k = 1`` in the score test of the shape k in ``exp(-(x/a)^k)``."""
-    x = own - 0.5  # times are rounded up to whole periods: half a period too long on average
+    x = lives - 0.5  # times are rounded up to whole periods: half a period too long on average
     logs = np.log(x)
     end, log_end = float(left), math.log(max(left, 1))
     count = x.size
@@ -133,7 +133,7 @@ def _weibull(own: Times, censored: int, left: int) -> float:
     return math.erfc(abs(score) / math.sqrt(2 * variance)) if variance > 0 else 0.0
 
 
-def _steady(own: Times, censored: int, left: int, rate: float) -> float:
+def _steady(lives: Times, censored: int, left: int, rate: float) -> float:
     """Return the p-value of equal rates in the intervals of the tail, by chi squared."""
     from scipy.special import chdtrc  # noqa: PLC0415 (scipy takes a while)
 
@@ -143,8 +143,8 @@ def _steady(own: Times, censored: int, left: int, rate: float) -> float:
     edges = np.concatenate([[0], edges[(edges > 0) & (edges < left)], [left]])
     squares = 0.0
     for low, high in itertools.pairwise(edges):
-        inside = own[(own > low) & (own <= high)]
-        beyond = int((own > high).sum()) + censored
+        inside = lives[(lives > low) & (lives <= high)]
+        beyond = int((lives > high).sum()) + censored
         expected = rate * (float((inside - low).sum()) + beyond * float(high - low))
         if expected > 0:
             squares += (inside.size - expected) ** 2 / (expected * (1 - min(rate, 0.999)))
@@ -152,7 +152,7 @@ def _steady(own: Times, censored: int, left: int, rate: float) -> float:
 
 
 def growth_on_saddle(
-    found: xr.Dataset,
+    basin_map: xr.Dataset,
     fitted: Tail | None,
     pendulum: Pendulum,
     threads: int,
@@ -161,29 +161,29 @@ def growth_on_saddle(
     none = math.nan, math.nan, 0
     if fitted is None:
         return none
-    units = Units.of(facts(found))
-    settle, label = found["settle_periods"].values, found["label"].values
-    end = np.where(settle >= 0, settle, found.attrs["max_periods"])
-    end = end - _settling(found, pendulum.period)
-    never = (label < 0) | np.concatenate([[False], chaotic(found)])[np.maximum(label, 0)]
+    units = Units.of(facts(basin_map))
+    settle, label = basin_map["settle_periods"].values, basin_map["label"].values
+    end = np.where(settle >= 0, settle, basin_map.attrs["max_periods"])
+    end = end - _settling(basin_map, pendulum.period)
+    never = (label < 0) | np.concatenate([[False], chaotic(basin_map)])[np.maximum(label, 0)]
     # Long-lived trajectories sample the natural measure of the saddle.
     least = _ALIGNED + max(math.ceil(fitted.mean / 2), 10)
     chosen = np.flatnonzero((end >= min(least, _LONGEST // 2)) & ~never)[:_FOLLOWED]
     if chosen.size < _LEAST_FOLLOWED:
         return none
     end = np.minimum(end[chosen], _LONGEST)
-    speeds = units.bare(found["start_velocity"].values[chosen], VELOCITY)
+    speeds = units.bare(basin_map["start_velocity"].values[chosen], VELOCITY)
     growth = _core.growth(
         pendulum,
-        found["start_theta"].values[chosen].copy(),
+        basin_map["start_theta"].values[chosen].copy(),
         np.ascontiguousarray(speeds),
         int(end.max()),
         1,
-        int(found.attrs["steps_per_period"]),
+        int(basin_map.attrs["steps_per_period"]),
         threads,
     )
-    each = np.arange(growth.shape[1])
-    mine = (each >= _ALIGNED) & (each < end[:, None])
+    periods = np.arange(growth.shape[1])
+    mine = (periods >= _ALIGNED) & (periods < end[:, None])
     length = mine.sum(axis=1)
     gain = np.where(mine, growth, 0.0).sum(axis=1)
     mean = gain.sum() / length.sum()
@@ -192,11 +192,11 @@ def growth_on_saddle(
     return float(mean), float(stderr), int(chosen.size)
 
 
-def _settling(found: xr.Dataset, period: float) -> NDArray[np.int64]:
+def _settling(basin_map: xr.Dataset, period: float) -> NDArray[np.int64]:
     """Return the number of periods in which each start approaches its attractor."""
-    rate = -Units.of(facts(found)).bare(found["exponent"].values, RATE) * period
+    rate = -Units.of(facts(basin_map)).bare(basin_map["exponent"].values, RATE) * period
     rate = np.where(np.isfinite(rate) & (rate > 0), rate, _SETTLING / _LEAST_SETTLING)
     periods = np.clip(np.ceil(_SETTLING / rate), _LEAST_SETTLING, _MOST_SETTLING)
-    label = found["label"].values.astype(np.int64)
-    own = np.concatenate([[0], periods]).astype(np.int64)
-    return np.asarray(own[np.maximum(label, 0)])
+    label = basin_map["label"].values.astype(np.int64)
+    by_label = np.concatenate([[0], periods]).astype(np.int64)
+    return np.asarray(by_label[np.maximum(label, 0)])

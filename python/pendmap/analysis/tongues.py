@@ -78,15 +78,15 @@ def _asymptotic_curves(dataset: xr.Dataset) -> dict[str, list[float]]:
 def drawn_tongues(dataset: xr.Dataset) -> dict[str, Any]:
     """Return the draws of critical curves for the JSON object."""
     asked = dataset["asked"].values.astype(bool)
-    found = {}
+    tables = {}
     for key, (table, prefix) in _TABLES.items():
         mine = dataset.isel({table: asked[dataset[f"{prefix}index"].values]})
         names = (f"{prefix}{name}" for name in ("multiplier", "p", "p_low", "p_high", "exists"))
-        found[key] = [
+        tables[key] = [
             {"omega": omega, "multiplier": sign, "p": p, "ci95": [low, high], "exists": exists}
             for omega, sign, p, low, high, exists in result.rows(mine, f"{table}_omega", *names)
         ]
-    return found
+    return tables
 
 
 SCHEMA = Schema(
@@ -216,15 +216,15 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
         same = partial(tongues, p_max=p_max, inverted=inverted)
         first = same(pendulum, asked, plane=plane, refine=refine, run=several.first)
         return tongues_over(first, several, partial(same, omega=first["omega"]))
-    frequencies, looked, (found, undamped, upright) = _solved(
+    frequencies, looked, (hanging, undamped, upright) = _solved(
         bare, asked, p_max, numerics, inverted=inverted, refine=refine
     )
-    if moved := bool(found[0].moved):
-        undamped = [_NO_REST] * len(found)
+    if moved := bool(hanging[0].moved):
+        undamped = [_NO_REST] * len(hanging)
     reach = 0.0 if moved else p_max
-    asymptotic, errors = critical_curves.asymptotic(found, frequencies, bare.gamma, reach)
+    asymptotic, errors = critical_curves.asymptotic(hanging, frequencies, bare.gamma, reach)
     variables = {
-        **_variables(frequencies, found, undamped, upright),
+        **_variables(frequencies, hanging, undamped, upright),
         "asked": flag("omega", np.isin(frequencies, asked), "whether the frequency was asked for"),
         "fold_sought": flag("omega", looked, "whether a fold was sought here"),
         "asymptotic": variable(("curve", "omega"), asymptotic, *_OF_P),
@@ -271,10 +271,10 @@ def _solved(  # noqa: PLR0913 (as for tongues)
         return _core.tongues(one, upright, at.tolist(), p_max, folds, numerics.run.workers, moved)
 
     def all_at(at: Floats, *, folds: bool = False) -> list[tuple[_Row, ...]]:
-        found = solve(at, pendulum, upright=False, folds=folds)
-        undamped = solve(at, free, upright=False) if free and not found[0].moved else found
+        hanging = solve(at, pendulum, upright=False, folds=folds)
+        undamped = solve(at, free, upright=False) if free and not hanging[0].moved else hanging
         above = solve(at, pendulum, upright=True) if inverted else [_NO_REST] * at.size
-        return list(zip(found, undamped, above, strict=True))
+        return list(zip(hanging, undamped, above, strict=True))
 
     def curves(rows: tuple[_Row, ...]) -> list[tuple[Floats, Floats]]:
         # The end of the search bounds the last strip.
@@ -285,19 +285,19 @@ def _solved(  # noqa: PLR0913 (as for tongues)
         if refine and asked.size > 1:
             views = [in_picture(asked, p_max, one) for one in PLANES]
             frequencies, rows = critical_curves.denser(asked, rows, all_at, curves, views)
-        found, undamped, upright = (list(column) for column in zip(*rows, strict=True))
+        hanging, undamped, upright = (list(column) for column in zip(*rows, strict=True))
         again = partial(solve, one=pendulum, upright=False, folds=True)
-        looked = critical_curves.fold_ends(frequencies, found, np.isin(frequencies, asked), again)
-    return frequencies, looked, (found, undamped, upright)
+        looked = critical_curves.fold_ends(frequencies, hanging, np.isin(frequencies, asked), again)
+    return frequencies, looked, (hanging, undamped, upright)
 
 
 def _variables(
-    omega: Floats, found: list[_Row], undamped: list[_Row], upright: list[_Row]
+    omega: Floats, hanging: list[_Row], undamped: list[_Row], upright: list[_Row]
 ) -> dict[str, Any]:
     """Return the tables of critical amplitudes, and the folds, at these frequencies."""
-    folds = [row.fold or (np.nan, np.nan, np.nan) for row in found]
+    folds = [row.fold or (np.nan, np.nan, np.nan) for row in hanging]
     fold, theta, velocity = np.array(folds).T
-    first = [row.stable[0] for row in found]
+    first = [row.stable[0] for row in hanging]
     variables: dict[str, Any] = {
         "stable_at_first": flag("omega", first, "rest below the first amplitude", _STABLE),
         "fold": variable("omega", fold, *_OF_P, "of the oscillation born at the first loss"),
@@ -305,7 +305,7 @@ def _variables(
         "fold_velocity": variable("omega", velocity, "1", "velocity dtheta/dtau of this point"),
     }
     for one, prefix, rows in (
-        ("critical", "", found),
+        ("critical", "", hanging),
         ("undamped", "undamped_", undamped),
         ("inverted", "inverted_", upright),
     ):
@@ -341,9 +341,9 @@ def _summary(dataset: xr.Dataset) -> list[str]:
         tips = [2 / k for k in range(1, _TIPS + 1)]
         never = np.array([tip for tip in tips if omega[0] <= tip <= omega[-1]])
     if never.size:
-        said = ", ".join(f"{value:.6g}" for value in never[:3])
+        omegas = ", ".join(f"{value:.6g}" for value in never[:3])
         more = f" and {never.size - 3} more" if never.size > 3 else ""  # noqa: PLR2004
-        lines.append(f"{hanging.capitalize()} is unstable from p = 0 on at omega = {said}{more}.")
+        lines.append(f"{hanging.capitalize()} is unstable from p = 0 on at omega = {omegas}{more}.")
     elif first:
         least = min(first, key=lambda k: p[k])
         lines.append(
@@ -407,13 +407,13 @@ def tongues_over(dataset: xr.Dataset, draws: Draws, analysis: Analysis) -> xr.Da
     every = [
         {table: _numbered(one, prefix) for table, prefix in tables} for one in draws.each(analysis)
     ]
-    found = dataset
+    with_draws = dataset
     for table, prefix in tables:
         mine = [[one[table].get(k, np.nan) for one in every] for k in _numbered(dataset, prefix)]
         p = np.array(mine, dtype=float).reshape(-1, len(draws))
         there = np.isfinite(p).mean(axis=1)
         _, _, low, high = interval(p)
-        found = found.assign(
+        with_draws = with_draws.assign(
             {
                 f"{prefix}drawn_p": variable((table, "draw"), p, *_OF_P),
                 f"{prefix}p_low": variable(table, low, "1", "lower end of 95 % of the draws"),
@@ -421,7 +421,7 @@ def tongues_over(dataset: xr.Dataset, draws: Draws, analysis: Analysis) -> xr.Da
                 f"{prefix}exists": variable(table, there, "1", "share of the draws that have it"),
             }
         )
-    return draws.complete(found, _lowest(found))
+    return draws.complete(with_draws, _lowest(with_draws))
 
 
 def _numbered(dataset: xr.Dataset, prefix: str) -> dict[tuple[int, int, int], float]:
@@ -435,13 +435,13 @@ def _numbered(dataset: xr.Dataset, prefix: str) -> dict[tuple[int, int, int], fl
     return numbered
 
 
-def _lowest(found: xr.Dataset) -> list[str]:
-    p, low, high = (found[name].values for name in ("p", "p_low", "p_high"))
-    asked = found["asked"].values.astype(bool)[found["index"].values]
+def _lowest(dataset: xr.Dataset) -> list[str]:
+    p, low, high = (dataset[name].values for name in ("p", "p_low", "p_high"))
+    asked = dataset["asked"].values.astype(bool)[dataset["index"].values]
     if not asked.any():
         return []
     k = int(np.argmin(np.where(asked, p, np.inf)))
-    omega = float(found["omega"].values[found["index"].values[k]])
+    omega = float(dataset["omega"].values[dataset["index"].values[k]])
     line = (
         f"The lowest critical amplitude, p = {p[k]:.6g} at omega = {omega:.6g}: 95 % of the "
         f"draws in [{low[k]:.6g}, {high[k]:.6g}]."

@@ -65,15 +65,15 @@ def rows_of(raws: Sequence[_core.Trajectory]) -> Rows:
 
 def several_facts(
     dataset: xr.Dataset,
-    each: Sequence[Mapping[str, float]],
+    all_facts: Sequence[Mapping[str, float]],
     angles: Floats,
     speeds: Floats,
     units: Units,
 ) -> None:
     """Set the facts of each trajectory over ``start``, nan where one has none."""
-    for name in dict.fromkeys(name for facts in each for name in facts):
+    for name in dict.fromkeys(name for facts in all_facts for name in facts):
         known = dataset[name]
-        values = np.array([facts.get(name, np.nan) for facts in each])
+        values = np.array([facts.get(name, np.nan) for facts in all_facts])
         dataset[name] = ("start", values.astype(known.dtype), known.attrs)
     first = variable("start", angles, "rad", "angle at the start")
     second = variable("start", speeds, units.of_velocity, "velocity at the start")

@@ -199,8 +199,8 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
     _refuse(given, timed=wanted is not None, several=several)
     periods, end = until / pendulum.period, units.bare(until, TIME)
     if samples is None:
-        each = _MOST_SAMPLES // angles.size
-        samples = int(min(_SAMPLES, max(1, each // max(periods, 1))))
+        per_start = _MOST_SAMPLES // angles.size
+        samples = int(min(_SAMPLES, max(1, per_start // max(periods, 1))))
         if not lyapunov:  # the batches of an exponent depend on the number of samples
             fastest = float(units.bare(np.abs(speeds).max(), VELOCITY))
             samples = max(samples, _smooth(bare, fastest, end) // angles.size)
@@ -235,21 +235,21 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
     dataset = _dataset(raws, every, once, clock, pendulum, several=several)
     facts_of = [
         {
-            **_exponent(own, time, units),
-            "turns": math.trunc((float(own.theta[-1]) - angle) / math.tau),
-            "stuck": int(own.stuck),
-            "reached_error": own.reached_error,
-            "end_error": own.end_error,
+            **_exponent(path, time, units),
+            "turns": math.trunc((float(path.theta[-1]) - angle) / math.tau),
+            "stuck": int(path.stuck),
+            "reached_error": path.reached_error,
+            "end_error": path.end_error,
         }
-        for own, angle in zip(raws, angles, strict=True)
+        for path, angle in zip(raws, angles, strict=True)
     ]
     values = {
         **numerics.provenance(),
-        **{name: value for own in reversed(facts_of) for name, value in own.items()},
+        **{name: value for of_start in reversed(facts_of) for name, value in of_start.items()},
         "theta0": None if several else angles.item(),
         "velocity0": None if several else speeds.item(),
         "until": float(time[-1]) if raw.interrupted else until,
-        "steps_per_period": max(own.steps_per_period for own in raws),
+        "steps_per_period": max(path.steps_per_period for path in raws),
         "lyapunov": int(lyapunov),
     }
     if raw.interrupted:
@@ -434,5 +434,5 @@ def _summary(dataset: xr.Dataset, units: Units) -> list[str]:
 def energy(theta: Floats, velocity: Floats, attributes: Any) -> Floats:  # noqa: ANN401 (a mapping)
     """Return ``E / (m g l) = v^2 / 2 + 1 - cos theta``, ``v = d theta / d tau`` about the pivot."""
     speed = Units.of(attributes).bare(velocity, VELOCITY)
-    found: Floats = 0.5 * speed**2 + 1.0 - np.cos(theta)
-    return found
+    energies: Floats = 0.5 * speed**2 + 1.0 - np.cos(theta)
+    return energies

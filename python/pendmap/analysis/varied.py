@@ -55,55 +55,59 @@ def varied(
             f"ranges must be a mapping like {few}, or on the command line {options}; "
             f"got {given or 'nothing'}"
         )
-    found = tuple(_axis(model, curve) for curve in curves)
-    every = [one for axis in found for one in axis.every]
+    axes = tuple(_axis(model, curve) for curve in curves)
+    every = [one for axis in axes for one in axis.every]
     first = {one.parameter: one for one in reversed(every)}
     for one in every:
         if (same := first[one.parameter]) is not one:
             raise InputError(f"{same.name} and {one.name} must be two parameters, they are one")
-    found = with_stroke(model, found)
+    axes = with_stroke(model, axes)
     pendulum, _ = without_dimensions(model)
-    for axis in found:
+    for axis in axes:
         for one in axis.every:
             for at in (one.bare.argmin(), one.bare.argmax()):
                 value, units = one.values[at], f" (without dimensions, w0 is {model.units.w0:g})"
                 try:
                     with_values(pendulum, {n: x[at] for n, x in axis.kernel})
                 except InputError as error:
-                    said = f"{error}{'' if value == one.bare[at] else units}"
-                    raise InputError(f"{one.name} = {value:g}: {said}") from None
-    return found
+                    reason = f"{error}{'' if value == one.bare[at] else units}"
+                    raise InputError(f"{one.name} = {value:g}: {reason}") from None
+    return axes
 
 
 def _curves(ranges: object, count: int) -> list[dict[str, Any]]:
     """Return names and values of the parameters of each axis."""
     if not isinstance(ranges, Mapping):
         return []
-    if count == 1 and not any(isinstance(own, tuple | Mapping) for own in ranges.values()):
+    if count == 1 and not any(isinstance(values, tuple | Mapping) for values in ranges.values()):
         ranges = {"": ranges}
-    curves = (own if isinstance(own, Mapping) else {name: own} for name, own in ranges.items())
+    curves = (
+        values if isinstance(values, Mapping) else {name: values} for name, values in ranges.items()
+    )
     return [dict(curve) for curve in curves if curve]
 
 
 def requested(axes: Sequence[Varied], ranges: Mapping[str, ArrayLike]) -> dict[str, Any]:
     """Return ranges as a request to a store has them: tuples with the lower end first, or lists."""
-    found: dict[str, Any] = {}
+    request: dict[str, Any] = {}
     for axis in axes:
         every = {one.name: one.values.tolist() for one in axis.every if not one.derived}
-        own = ranges.get(axis.name)
-        one = (*sorted(own[:2]), own[2]) if isinstance(own, tuple) else every[axis.name]
-        found[axis.name] = every if len(every) > 1 else one
-    return found
+        given = ranges.get(axis.name)
+        one = (*sorted(given[:2]), given[2]) if isinstance(given, tuple) else every[axis.name]
+        request[axis.name] = every if len(every) > 1 else one
+    return request
 
 
 def having(model: Pendulum | Rig, ranges: Mapping[str, ArrayLike]) -> Pendulum | Rig:
     """Return the model with each effect that it lacks and whose only parameter varies."""
     there = {effect.name for effect in model.effects}
-    own = without_dimensions(model)[0].numbers()  # gamma and theta_r are effects, too
+    numbers = without_dimensions(model)[0].numbers()  # gamma and theta_r are effects, too
     lacking = {
         f"{one.name}.{one.parameters[0].name}": Effect(one.name, {one.parameters[0].name: 0.0})
         for one in effects()
-        if one.name not in there and len(one.parameters) == 1 and one.parameters[0].name not in own
+        if one.name not in there
+        and len(one.parameters) == 1
+        and one.parameters[0].name not in numbers
     }
     names = [name for curve in _curves(ranges, 0) for name in curve]
     new = (lacking[name] for name in names if name in lacking)
@@ -122,11 +126,11 @@ def title(model: Pendulum | Rig, *axes: Varied) -> str:
 def title_without(model: Pendulum | Rig, *names: str) -> str:
     """Return the model in one line without some of its parameters, by the core's names."""
     whole = [effect.title(model.units) for effect in model.effects]
-    own = model.title.removesuffix(", ".join(whole)).removesuffix(", ")
+    bare_title = model.title.removesuffix(", ".join(whole)).removesuffix(", ")
     both = [(name, COUNTERPARTS[name][0]) for name in names if name in COUNTERPARTS]
     symbols = {LABELS[name].symbol for pair in both for name in pair}
-    kept = [part for part in own.split(", ") if part.partition(" = ")[0] not in symbols]
-    return ", ".join([*kept, *(effect.title(model.units, names) for effect in model.effects)])
+    parts = [part for part in bare_title.split(", ") if part.partition(" = ")[0] not in symbols]
+    return ", ".join([*parts, *(effect.title(model.units, names) for effect in model.effects)])
 
 
 def remarks(model: Pendulum | Rig, *axes: Varied) -> list[str]:
@@ -147,12 +151,12 @@ def _axis(model: Pendulum | Rig, curve: Mapping[str, Any]) -> Varied:
     name, given = next(iter(curve.items()))
     if len(curve) == 1 and isinstance(given, tuple):
         return _one(model, name, _values(name, given))
-    arrays = {one: ascending(one, own, any_order=True) for one, own in curve.items()}
+    arrays = {one: ascending(one, values, any_order=True) for one, values in curve.items()}
     count, order = arrays[name].size, -1 if arrays[name][0] > arrays[name][-1] else 1
-    for one, own in arrays.items():
-        if own.size != count:
-            raise InputError(f"{one} must have as many values as {name}, {count}, got {own.size}")
-    first, *along = (_one(model, one, own[::order]) for one, own in arrays.items())
+    for one, array in arrays.items():
+        if array.size != count:
+            raise InputError(f"{one} must have as many values as {name}, {count}, got {array.size}")
+    first, *along = (_one(model, one, values[::order]) for one, values in arrays.items())
     if not (np.diff(first.values) > 0).all():
         raise InputError(f"{name} must be ascending or descending values, got {short_repr(given)}")
     return dataclasses.replace(first, along=tuple(along))
@@ -162,23 +166,23 @@ def _one(model: Pendulum | Rig, name: str, values: Floats) -> Varied:
     pendulum, units = without_dimensions(model)
     known = _core.parameter_names(pendulum)
     # Name in the core, factor and power of w0 of each quantity.
-    own = {bare: (bare, 1.0, 0) for bare in known if "." not in bare}
+    conversions = {bare: (bare, 1.0, 0) for bare in known if "." not in bare}
     if isinstance(model, Rig):
         for bare in ("gamma", "omega", "phase", "theta_r"):
             si, power = COUNTERPARTS[bare]
-            own[si] = (bare, 1.0, power)
-        own["frequency_hz"] = ("omega", math.tau, 1)
-        own["stroke_mm"] = ("p", 1e-3 * model.Omega**2 / model.gravity, 0)
+            conversions[si] = (bare, 1.0, power)
+        conversions["frequency_hz"] = ("omega", math.tau, 1)
+        conversions["stroke_mm"] = ("p", 1e-3 * model.Omega**2 / model.gravity, 0)
     effects = {e.name: e for e in model.effects}
     shared = [f"{e.name}.{parameter}" for e in model.effects for parameter in e.parameters]
-    if name not in own and name not in shared:
-        there = ", ".join([*own, *shared])
+    if name not in conversions and name not in shared:
+        there = ", ".join([*conversions, *shared])
         raise InputError(
             f"{short_repr(name)} is no parameter of this model: it must be one of {there}"
             f"{_of_effect(name)}"
         )
-    if name in own:
-        bare, factor, power = own[name]
+    if name in conversions:
+        bare, factor, power = conversions[name]
         if name in {"frequency_hz", "stroke_mm"}:
             check(name, values.min())
         plain = units.bare(factor * values, power)
@@ -263,12 +267,12 @@ def pendulum_of(dataset: xr.Dataset) -> Pendulum | Rig:
     if not isinstance(text, str):
         raise InputError(f"dataset must be a result of pendmap, got {short_repr(type(dataset))}")
     model = parse_model(text, "dataset")
-    known, own = model.attributes, facts(dataset)
+    known, stored = model.attributes, facts(dataset)
     names = [*LABELS, *(f"{e.name}.{p}" for e in model.effects for p in e.parameters)]
     chosen = {
-        name: float(own[name])
+        name: float(stored[name])
         for name in names
-        if name in dataset.coords and name in own and known.get(name) != own[name]
+        if name in dataset.coords and name in stored and known.get(name) != stored[name]
     }
     of_effects = {name: x for name, x in chosen.items() if name not in LABELS}
     if len(chosen) > len(of_effects):
@@ -279,7 +283,7 @@ def pendulum_of(dataset: xr.Dataset) -> Pendulum | Rig:
 
 def with_values(model: Pendulum | Rig, values: Mapping[str, float]) -> Pendulum | Rig:
     """Return the model with these parameters; its effects without their intervals."""
-    own = {name: x for name, x in values.items() if name in model.numbers()}
+    numbers = {name: x for name, x in values.items() if name in model.numbers()}
     effects = tuple(
         dataclasses.replace(
             effect,
@@ -291,5 +295,5 @@ def with_values(model: Pendulum | Rig, values: Mapping[str, float]) -> Pendulum 
         )
         for effect in model.effects
     )
-    changed: dict[str, Any] = {**own, "effects": effects}
+    changed: dict[str, Any] = {**numbers, "effects": effects}
     return dataclasses.replace(model, **changed)

@@ -75,14 +75,14 @@ def listed(dataset: xr.Dataset, most: int | None = MOST) -> list[Branch]:
         most = None
     named = set(np.argsort(-share, kind="stable")[:most].tolist())
     seen: Counter[str] = Counter()
-    found = []
+    branches = []
     chosen = dataset["colour"].values.tolist() if "colour" in dataset else [""] * share.size
     for k, one in enumerate(attractors_of(dataset, "branch_")):
         colour = chosen[k] or palette.colour(one, seen[one.plain])
         seen[one.plain] += 1
         name = typeset(str(dataset["attractor"].values[k]))
-        found.append(Branch(k + 1, *((name, colour) if k in named else ("", OTHERS))))
-    return found
+        branches.append(Branch(k + 1, *((name, colour) if k in named else ("", OTHERS))))
+    return branches
 
 
 def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -> Chart:

@@ -143,17 +143,17 @@ def families(dataset: xr.Dataset) -> list[Family]:
     owner = dataset["point_entry"].values
     points = np.column_stack([dataset["point_value"].values, plane.points(dataset)])
     sweeps = {key: np.append(which, -1)[dataset[key].values] for key in ("up", "down")}
-    found: list[Family] = []
+    listed: list[Family] = []
     regular = np.array([not one.chaotic for one in every], dtype=bool)
     first = np.lexsort((-count, regular, count == 0))[:MOST]
     shades, called = colours_of(dataset, "kind_"), dataset["kind"].values
     for k in np.lexsort((-count, ~np.isin(np.arange(count.size), first)))[: np.sum(count > 0)]:
         mine = which == k
         exponents = np.stack([value[mine], dataset["entry_exponent"].values[mine]], axis=1)
-        shade = palette.on_white(shades[k]) if len(found) < MOST else palette.UNNAMED
+        shade = palette.on_white(shades[k]) if len(listed) < MOST else palette.UNNAMED
         look, on = (
             (str(called[k]), shade, every[k].chaotic),
             (sweeps["up"] == k, sweeps["down"] == k),
         )
-        found.append(Family(*look, points[mine[owner]], exponents, *on))
-    return found
+        listed.append(Family(*look, points[mine[owner]], exponents, *on))
+    return listed

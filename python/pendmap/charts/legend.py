@@ -59,7 +59,7 @@ def entries(dataset: xr.Dataset) -> list[Entry]:
     }
     owner = dataset["point_attractor"].values
     points = plane.points(dataset)
-    found = []
+    listed = []
     looks = zip(names.items(), attractors_of(dataset), colours_of(dataset), strict=True)
     for k, ((i, name), one, colour) in enumerate(looks):
         row = dataset.isel(attractor=k)
@@ -68,23 +68,23 @@ def entries(dataset: xr.Dataset) -> list[Entry]:
         fraction, mine = float(row["fraction"]), points[owner == i]
         share = percent(fraction, float(row["stderr"]))
         look = (colour, palette.marker(one), one.chaotic)
-        found.append(Entry(i, name, *look, fraction, share, other, mine))
-    if dataset.attrs.get("layers") == "finite_time" and not found:
-        return found
+        listed.append(Entry(i, name, *look, fraction, share, other, mine))
+    if dataset.attrs.get("layers") == "finite_time" and not listed:
+        return listed
     none = np.empty((0, 2))
     for i, name, colour in ((0, "undecided", palette.UNDECIDED), (-1, "failed", palette.FAILED)):
         share_of = float(facts(dataset).get(name, 0.0))
         if share_of > 0:
             look = (colour, "s", False)
-            found.append(Entry(i, name, *look, share_of, percent(share_of), "", none))
-    return found
+            listed.append(Entry(i, name, *look, share_of, percent(share_of), "", none))
+    return listed
 
 
 def colours_of(dataset: xr.Dataset, prefix: str = "") -> list[str]:
     """Return the colour of each attractor: the one a user chose, or that of its type."""
     chosen = dataset["colour"].values.tolist() if "colour" in dataset else itertools.repeat("")
     every = attractors_of(dataset, prefix)
-    return [own or palette.colour(one) for own, one in zip(chosen, every, strict=False)]
+    return [choice or palette.colour(one) for choice, one in zip(chosen, every, strict=False)]
 
 
 def with_looks(

@@ -82,27 +82,27 @@ def kinds(dataset: xr.Dataset) -> list[Kind]:
     looks, every = colours_of(dataset, "kind_"), attractors_of(dataset, "kind_")
     frequent = np.argsort(-presence, kind="stable")[:_MOST]
     frequent = frequent[presence[frequent] >= _LEAST]
-    found: list[tuple[tuple[float, ...], Kind]] = []
+    ranked: list[tuple[tuple[float, ...], Kind]] = []
     rare: dict[str, list[int]] = {}
     for k in np.flatnonzero(presence).tolist():
         family, colour = every[k].kind, looks[k]
         if family not in _OTHERS or (k in frequent and colour != _OTHERS[family][1]):
             one = Kind(str(called[k]), colour, (str(called[k]),), float(presence[k]))
-            found.append((every[k].rank, one))
+            ranked.append((every[k].rank, one))
         else:
             rare.setdefault(family, []).append(k)
     for family, members in rare.items():
         total = float(share[has[:, members].any(axis=1)].sum())
-        own, first = tuple(map(str, called[members])), every[members[0]].rank
+        labels, first = tuple(map(str, called[members])), every[members[0]].rank
         if len(members) > 1:
-            found.append(((first[0], math.inf), Kind(*_OTHERS[family], own, total)))
+            ranked.append(((first[0], math.inf), Kind(*_OTHERS[family], labels, total)))
         else:
-            found.append((first, Kind(own[0], looks[members[0]], own, total)))
+            ranked.append((first, Kind(labels[0], looks[members[0]], labels, total)))
     undecided = float(share[~has.any(axis=1)].sum())
     if undecided:
         one = Kind(UNDECIDED, palette.UNDECIDED, (UNDECIDED,), undecided)
-        found.append(((math.inf,), one))
-    return [one for _, one in sorted(found, key=operator.itemgetter(0))]
+        ranked.append(((math.inf,), one))
+    return [one for _, one in sorted(ranked, key=operator.itemgetter(0))]
 
 
 def striped(dataset: xr.Dataset, size: int, width: int) -> npt.NDArray[np.uint8]:

@@ -70,8 +70,8 @@ def analysis_command(
                 if runs:
                     from pendmap.analysis.run import RunOptions
 
-                    kept = {"store": store, "resume": bool(resume), "executor": executor}
-                    arguments["run"] = RunOptions(progress=progress, **kept, **chosen)
+                    run_options = {"store": store, "resume": bool(resume), "executor": executor}
+                    arguments["run"] = RunOptions(progress=progress, **run_options, **chosen)
                 dataset = getattr(module, function)(pendulum, **arguments)
             if store is None:
                 show(dataset, outputs, module.SCHEMA)

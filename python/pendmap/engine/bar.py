@@ -121,5 +121,5 @@ class ProgressBar:
 def _in_notebook() -> bool:
     """Return whether this process is the kernel of a notebook."""
     shell = sys.modules.get("IPython")
-    found = shell.get_ipython() if shell is not None else None
-    return found is not None and getattr(found, "kernel", None) is not None
+    interpreter = shell.get_ipython() if shell is not None else None
+    return interpreter is not None and getattr(interpreter, "kernel", None) is not None

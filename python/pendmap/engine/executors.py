@@ -98,15 +98,15 @@ def _check_scheduler(address: str) -> None:
 @contextlib.contextmanager
 def _silent(name: str) -> Iterator[None]:
     """Silence the loggers of a package: workers or a scheduler that end would fill many lines."""
-    known = [each for each in logging.root.manager.loggerDict if each.partition(".")[0] == name]
-    before = {each: logging.getLogger(each).level for each in known}
-    for each in known:
-        logging.getLogger(each).setLevel(logging.CRITICAL + 1)
+    known = [key for key in logging.root.manager.loggerDict if key.partition(".")[0] == name]
+    before = {key: logging.getLogger(key).level for key in known}
+    for key in known:
+        logging.getLogger(key).setLevel(logging.CRITICAL + 1)
     try:
         yield
     finally:
-        for each, level in before.items():
-            logging.getLogger(each).setLevel(level)
+        for key, level in before.items():
+            logging.getLogger(key).setLevel(level)
 
 
 class WorkersGoneError(RuntimeError):

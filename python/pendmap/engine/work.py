@@ -158,12 +158,12 @@ class Work:
             return self.job.tile(step, data, tile, inputs, report)
 
         with contextlib.ExitStack() as stack:
-            found: Iterable[tuple[int, Tile]] = ((tile, compute(tile)) for tile in tiles)
+            outcomes: Iterable[tuple[int, Tile]] = ((tile, compute(tile)) for tile in tiles)
             if self.job.at_once > 1:
                 pool = stack.enter_context(ThreadPoolExecutor(self.job.at_once))
                 stack.callback(stop.set)  # before the pool waits for its threads
-                found = results(pool, lambda tile: (compute, tile), tiles)
-            for tile, one in found:
+                outcomes = results(pool, lambda tile: (compute, tile), tiles)
+            for tile, one in outcomes:
                 if one.cells:
                     self.store.write(tile, one.cells)
                 self.store.put(f"{step}/{tile}", one.record)
@@ -194,8 +194,8 @@ def _alone(  # noqa: PLR0913, PLR0917 (what a worker needs)
 ) -> Tile | Exception:
     """Compute a tile; an error is a result, so that every executor treats it alike."""
     if rounding() != bits:
-        said = "instruction set of a worker must round like that of the run"
-        return InputError(f"{said} ({bits}), got {rounding()}")
+        message = "instruction set of a worker must round like that of the run"
+        return InputError(f"{message} ({bits}), got {rounding()}")
     try:
         return job.tile(step, state, tile, inputs)
     except Exception as error:  # noqa: BLE001 (raised in the process that drives)
@@ -208,14 +208,14 @@ def _in_store(  # noqa: PLR0913, PLR0917 (what a worker needs)
     """Compute a tile and store it; return its record."""
     try:
         inputs = job.inputs(store, step, tile)
-        found = _alone(job, step, _state(store, *state), bits, tile, inputs, attempt)
-        if isinstance(found, Exception):
-            return found
-        store.write(tile, found.cells)
-        store.put(f"{step}/{tile}", found.record)
+        outcome = _alone(job, step, _state(store, *state), bits, tile, inputs, attempt)
+        if isinstance(outcome, Exception):
+            return outcome
+        store.write(tile, outcome.cells)
+        store.put(f"{step}/{tile}", outcome.record)
     except Exception as error:  # noqa: BLE001 (as above)
         return error
-    return Tile(found.record)
+    return Tile(outcome.record)
 
 
 @functools.lru_cache(maxsize=4)

@@ -176,9 +176,9 @@ def check_chunks(address: str | os.PathLike[str]) -> None:
     check_digest(address, mark, read_chunks(address, arrays))
 
 
-def check_digest(address: str | os.PathLike[str], mark: Mapping[str, Any], found: str) -> None:
+def check_digest(address: str | os.PathLike[str], mark: Mapping[str, Any], computed: str) -> None:
     """Raise InputError if the digest of a complete store's chunks is another than its mark has."""
-    if mark.get(CHUNKS, found) != found:
+    if mark.get(CHUNKS, computed) != computed:
         raise InputError(f"{address}: its chunks were changed after they were written")
 
 

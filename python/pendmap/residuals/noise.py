@@ -137,11 +137,11 @@ def estimate_noise(
     left = ((1 / laws.shapes) @ spectra.slow.T) / laws.scales
     laws = _posterior(laws, left, degrees, sizes)
     parts = [slice(None), *(slice(k, k + 1) for k in range(len(runs)))]
-    found = [
-        _excess(left[:, own], degrees[own], sizes[own], laws.weights, laws.sizes[own])
-        for own in parts
+    excesses = [
+        _excess(left[:, part], degrees[part], sizes[part], laws.weights, laws.sizes[part])
+        for part in parts
     ]
-    (z, *by_run), chances = zip(*found, strict=True)
+    (z, *by_run), chances = zip(*excesses, strict=True)
     # The noise's density, weighted by the spectrum of the motion.
     levels = np.sum((laws.shapes @ spectra.motion.T) * laws.scales, axis=1) / spectra.motion.sum()
     return ResidualNoise(
@@ -149,7 +149,7 @@ def estimate_noise(
         float(laws.weights @ laws.correlations),
         z,
         tuple(by_run),
-        min(min(chances) * len(found), 1.0),
+        min(min(chances) * len(excesses), 1.0),
         np.stack([levels, laws.weights]),
         float(spectra.quick_sizes.sum()),
         spectra.independent,
@@ -281,10 +281,10 @@ def noise_laws(power: Floats, sizes: Floats, floors: Floats) -> Laws:
     """
     grid = _law_grid()
     total, number = sizes.sum(), sizes.sum(axis=1)
-    own = number >= OWN
+    separate = number >= OWN
     sums = grid.inverse @ power.T
     together = sums.sum(axis=1) / total
-    scales = np.where(own, sums / np.where(own, number, 1.0), together[:, None])
+    scales = np.where(separate, sums / np.where(separate, number, 1.0), together[:, None])
     scales = np.maximum(scales, np.finfo(float).tiny)
     deviance = grid.logarithms @ sizes.sum(axis=0) + np.log(scales) @ number
     deviance += (sums / scales).sum(axis=1)
@@ -294,7 +294,7 @@ def noise_laws(power: Floats, sizes: Floats, floors: Floats) -> Laws:
     weights /= weights.sum()
     keep = weights > FAINT * weights.max()
     correlations = (grid.colours * grid.shares)[keep]
-    sizes = np.where(own, number, total)
+    sizes = np.where(separate, number, total)
     return Laws(weights[keep], correlations, grid.shapes[keep], scales[keep], sizes)
 
 

@@ -62,21 +62,21 @@ class Draws:
         for k, model in enumerate(self.models, 1):
             yield analysis(model, run=self.run.part(k, len(self) + 1))
 
-    def complete(self, found: xr.Dataset, lines: Iterable[str]) -> xr.Dataset:
+    def complete(self, dataset: xr.Dataset, lines: Iterable[str]) -> xr.Dataset:
         """Return a result with the drawn parameters, and with summary lines on the draws."""
         names = ", ".join(self.names)
         head = f"{counted(len(self), 'draw')} of {names} from the covariance of the fit."
-        found.attrs |= {"draws": len(self), "draws_seed": self.run.seed}
-        found.attrs["summary"] = "\n".join([found.attrs["summary"], head, *lines])
+        dataset.attrs |= {"draws": len(self), "draws_seed": self.run.seed}
+        dataset.attrs["summary"] = "\n".join([dataset.attrs["summary"], head, *lines])
         text, comment = "parameters of each draw", "each in the units of the model"
-        found = found.assign(
+        dataset = dataset.assign(
             drawn=variable(("draw", "parameter"), self.values, "", text, comment),
             parameter=variable("parameter", np.array(self.names, dtype=str), long_name="name"),
         )
-        return found.assign_coords(indices(found))
+        return dataset.assign_coords(indices(dataset))
 
 
-def drawn_field(own: Callable[[xr.Dataset], dict[str, Any]]) -> Field:
+def drawn_field(entries_of: Callable[[xr.Dataset], dict[str, Any]]) -> Field:
     """Return the JSON key ``draws``: the drawn models and their results, null without draws."""
 
     def read(dataset: xr.Dataset) -> dict[str, Any] | None:
@@ -85,7 +85,7 @@ def drawn_field(own: Callable[[xr.Dataset], dict[str, Any]]) -> Field:
             return None
         names = dataset["parameter"].values.tolist()
         common = {"count": a["draws"], "seed": a["draws_seed"], "parameters": names}
-        return common | own(dataset)
+        return common | entries_of(dataset)
 
     return Field("draws", "", "models drawn from the covariance, and their results", read=read)
 
@@ -163,11 +163,11 @@ def outcomes(
     mean, _, low, high = interval(share)
     certain = probability.max(axis=0)
     of_share = "of the outcome's share of the cells over the draws"
-    likely, own = "probability of the most likely outcome", "share of the cells in each draw"
+    likely, per_draw = "probability of the most likely outcome", "share of the cells in each draw"
     return {
         "probability": variable(("outcome", *dims), probability, "1", "probability"),
         "certainty": variable(dims, certain, "1", likely),
-        "drawn_share": variable(("outcome", "draw"), share, "1", own),
+        "drawn_share": variable(("outcome", "draw"), share, "1", per_draw),
         "share_mean": variable("outcome", mean, "1", f"mean {of_share}"),
         "share_low": variable("outcome", low, "1", f"lower end of 95 % {of_share}"),
         "share_high": variable("outcome", high, "1", f"upper end of 95 % {of_share}"),
@@ -177,9 +177,9 @@ def outcomes(
     }
 
 
-def sure_line(found: xr.Dataset, what: str) -> str:
+def sure_line(dataset: xr.Dataset, what: str) -> str:
     """Return a summary line on the share of sure cells."""
     return (
-        f"{100 * float(found['sure_cells']):.1f} % of the cells have {what} with a probability of "
-        f"{100 * _SURE:g} % or more."
+        f"{100 * float(dataset['sure_cells']):.1f} % of the cells have {what} with a probability "
+        f"of {100 * _SURE:g} % or more."
     )

@@ -54,10 +54,10 @@ def basins_over(dataset: xr.Dataset, draws: Draws, analysis: Analysis) -> xr.Dat
     a certainty of 95 % or more.
     """
     ends, start, known = _counted(dataset, draws.each(analysis))
-    found = dataset.assign(_variables(dataset["label"], ends, start, known, len(draws)))
-    means = {f"{name}_mean": found[name].mean(keep_attrs=True) for name in _DOUBT}
-    found = found.assign(means)
-    return draws.complete(found, _summary(found))
+    with_draws = dataset.assign(_variables(dataset["label"], ends, start, known, len(draws)))
+    means = {f"{name}_mean": with_draws[name].mean(keep_attrs=True) for name in _DOUBT}
+    with_draws = with_draws.assign(means)
+    return draws.complete(with_draws, _summary(with_draws))
 
 
 @drawn_field
@@ -93,11 +93,11 @@ def _counted(
     dataset: xr.Dataset, drawn: Iterable[xr.Dataset]
 ) -> tuple[dict[str, _End], Floats, NDArray[np.int64]]:
     """Return outcomes by name, summed entropies of the boxes, and draws with known outcomes."""
-    own = dataset["label"]
-    none = _in_boxes(own, own.values > 0).values * 0.0
+    labels = dataset["label"]
+    none = _in_boxes(labels, labels.values > 0).values * 0.0
 
     def new(plain: str, points: Floats) -> _End:
-        return _End(plain, points, np.zeros(own.shape, np.uint16), none.copy())
+        return _End(plain, points, np.zeros(labels.shape, np.uint16), none.copy())
 
     names, plain, points = _attractors(dataset)
     ends = {name: new(plain[k], points[k]) for k, name in enumerate(names)}
@@ -113,14 +113,14 @@ def _counted(
                 alike = sum(end.plain == plain[k] for end in ends.values())
                 mine[k] = name if name not in ends else f"{name} ({alike + 1})"
                 ends[mine[k]] = new(plain[k], points[k])
-        inside = _in_boxes(own, label > 0).values
+        inside = _in_boxes(labels, label > 0).values
         known += inside > 0
         entropy = none.copy()
         for value, name in enumerate(mine, 1):
             here = label == value
             ends[name].cells += here
             ends[name].shares[d] = float(here.mean())
-            part = _in_boxes(own, here).values / np.maximum(inside, 1)
+            part = _in_boxes(labels, here).values / np.maximum(inside, 1)
             ends[name].boxes += part
             entropy += _entropy(part)
         start += entropy
@@ -140,10 +140,10 @@ def _attractors(dataset: xr.Dataset) -> tuple[list[str], list[str], list[Floats]
 
 
 def _variables(
-    own: xr.DataArray, ends: dict[str, _End], start: Floats, known: NDArray[np.int64], draws: int
+    labels: xr.DataArray, ends: dict[str, _End], start: Floats, known: NDArray[np.int64], draws: int
 ) -> dict[str, Any]:
     """Return the counts as variables of a dataset."""
-    dims, names = own.dims, sorted(ends, key=lambda name: name in _UNKNOWN)
+    dims, names = labels.dims, sorted(ends, key=lambda name: name in _UNKNOWN)
     every = [ends[name] for name in names]
     probability = np.stack([end.cells for end in every]).astype(np.float32) / draws
     share = np.array([[end.shares.get(d, 0.0) for d in range(draws)] for end in every])
@@ -151,7 +151,7 @@ def _variables(
     known = np.maximum(known, 1)
     total = sum((_entropy(end.boxes / known) for end in ends.values()), 0.0 * start)
     start = start / known
-    boxes = _in_boxes(own, own.values > 0)
+    boxes = _in_boxes(labels, labels.values > 0)
     over_boxes = tuple(f"box_{name}" for name in dims)
     label = _entropy(probability).sum(axis=0, dtype=np.float32)
     reduced, there = np.maximum(total - start, 0.0), "share of the draws that have it"
@@ -167,7 +167,7 @@ def _variables(
             f"box_{name}": variable(
                 f"box_{name}",
                 boxes[name].values,
-                own[name].attrs.get("units", "1"),
+                labels[name].attrs.get("units", "1"),
                 f"centre of a box: {name}",
             )
             for name in dims
@@ -175,10 +175,10 @@ def _variables(
     }
 
 
-def _in_boxes(own: xr.DataArray, cells: Mask) -> xr.DataArray:
+def _in_boxes(labels: xr.DataArray, cells: Mask) -> xr.DataArray:
     """Return the number of true cells in each whole box, at the boxes' centres."""
-    window = {name: min(BOX, size) for name, size in own.sizes.items()}
-    return own.copy(data=cells).coarsen(window, boundary="trim").sum()
+    window = {name: min(BOX, size) for name, size in labels.sizes.items()}
+    return labels.copy(data=cells).coarsen(window, boundary="trim").sum()
 
 
 def _entropy(part: NDArray[Any]) -> NDArray[Any]:
@@ -186,16 +186,16 @@ def _entropy(part: NDArray[Any]) -> NDArray[Any]:
     return -part * np.log(np.where(part > 0, part, 1))
 
 
-def _summary(found: xr.Dataset) -> list[str]:
+def _summary(dataset: xr.Dataset) -> list[str]:
     lines: list[str] = []
-    start, parameters = (float(found[f"{name}_mean"]) for name in _DOUBT)
-    for name, mean, low, high, exists in rows(found, *_SHARES):
+    start, parameters = (float(dataset[f"{name}_mean"]) for name in _DOUBT)
+    for name, mean, low, high, exists in rows(dataset, *_SHARES):
         there = "" if exists == 1 or name in _UNKNOWN else f", in {100 * exists:.3g} % of them"
         lines.append(
             f"{name}: {100 * mean:.2f} % of the starts, 95 % of the draws in "
             f"[{100 * low:.2f}, {100 * high:.2f}] %{there}."
         )
-    lines.append(sure_line(found, "an end"))
+    lines.append(sure_line(dataset, "an end"))
     lines.append(
         f"Entropy of the end in a box of {BOX} x {BOX} cells: {start + parameters:.3f} nat = "
         f"{start:.3f} from the position of the start in the box + "

@@ -66,9 +66,9 @@ def branches(job: SweepTiles, maps: Mapping[Place, Mapped]) -> dict[Place, list[
 def _rests(maps: Mapping[Place, Mapped], places: list[Place]) -> Iterator[tuple[str, Node]]:
     """Yield what is at rest, the only one of its name: one also where it repels in between."""
     for place in places:
-        names = [_core.Attractor(*own.described).plain for own in maps[place].found]
-        for k, own in enumerate(maps[place].found):
-            if own.kind in ("rest", "inverted_rest") and names.count(names[k]) == 1:
+        names = [_core.Attractor(*attractor.described).plain for attractor in maps[place].found]
+        for k, attractor in enumerate(maps[place].found):
+            if attractor.kind in ("rest", "inverted_rest") and names.count(names[k]) == 1:
                 yield names[k], (place, k)
 
 
@@ -120,7 +120,7 @@ def _links(
         alone = old[k].kind == new[m].kind in _ALONE and k not in here and m not in there
         return math.inf if alone else _LIKE
 
-    first, second = ([own.points for own in found] for found in (old, new))
+    first, second = ([attractor.points for attractor in attractors] for attractors in (old, new))
     orbits = [(k, m) for k, m in ahead.items() if back.get(m) == k]
     pairs = matched(first, second, reach, orbits, circle=circle)
     return [(near, far, (before, k), (place, m)) for near, far, k, m in pairs]
@@ -175,10 +175,10 @@ def _alike(one: Found, other: Found) -> bool:
     return turns and not {one.symmetric, other.symmetric} >= {True, False}
 
 
-def _family(own: Found) -> tuple[str, bool]:
+def _family(attractor: Found) -> tuple[str, bool]:
     """Return what an attractor keeps where its period doubles or it becomes chaotic."""
-    if own.kind in ("oscillation", "libration_chaos"):
+    if attractor.kind in ("oscillation", "libration_chaos"):
         return "swings", False
-    if own.kind in ("rotation", "rotating_chaos", "quasiperiodic_rotation"):
-        return "turns", own.w < 0
-    return own.kind, False
+    if attractor.kind in ("rotation", "rotating_chaos", "quasiperiodic_rotation"):
+        return "turns", attractor.w < 0
+    return attractor.kind, False

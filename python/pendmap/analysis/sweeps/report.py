@@ -30,21 +30,21 @@ def varied_names(dataset: xr.Dataset) -> list[str]:
 def attractors(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the attractors for JSON, with the ranges in which each exists."""
     dims = varied_names(dataset)
-    found = []
+    entries = []
     for k, name in enumerate(dataset["attractor"].values):
         exists = dataset["exists"].values[..., k] > 0
         fraction = dataset["fraction"].values[..., k]
         where = np.unravel_index(int(np.argmax(fraction)), fraction.shape)
         values = [dataset[dim].values[at] for dim, at in zip(dims, np.nonzero(exists), strict=True)]
-        found.append(
+        entries.append(
             {
                 "id": k + 1,
                 "name": str(name),
                 "twin": int(dataset["twin"].values[k]) or None,
                 "models": int(exists.sum()),
                 "ranges": {
-                    dim: [float(own.min()), float(own.max())]
-                    for dim, own in zip(dims, values, strict=True)
+                    dim: [float(coordinate.min()), float(coordinate.max())]
+                    for dim, coordinate in zip(dims, values, strict=True)
                 },
                 "largest_fraction": float(fraction.max()),
                 "largest_at": {
@@ -52,14 +52,14 @@ def attractors(dataset: xr.Dataset) -> list[dict[str, Any]]:
                 },
             }
         )
-    return found
+    return entries
 
 
 def maps(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the maps for JSON, each with its attractors."""
     dims = varied_names(dataset)
     every = [name for name, _, _ in (*MEASURES.values(), *COUNTS.values())]
-    found = []
+    entries = []
     for place in np.ndindex(*(dataset.sizes[dim] for dim in dims)):
         one: dict[str, Any] = {
             dim: float(dataset[dim].values[at]) for dim, at in zip(dims, place, strict=True)
@@ -70,8 +70,8 @@ def maps(dataset: xr.Dataset) -> list[dict[str, Any]]:
             one[name] = None if isinstance(value, float) and math.isnan(value) else value
         exists = np.flatnonzero(dataset["exists"].values[place])
         one["attractors"] = [_entry(dataset, place, int(k)) for k in exists]
-        found.append(one)
-    return found
+        entries.append(one)
+    return entries
 
 
 def _entry(dataset: xr.Dataset, place: Place, k: int) -> dict[str, Any]:
@@ -95,11 +95,11 @@ def summary(dataset: xr.Dataset) -> list[str]:
     a = facts(dataset)
     every = attractors(dataset)
     spans = [span(dim, *dataset[dim].values[[0, -1]]) for dim in varied_names(dataset)]
-    said = f"{counted(a['models'], 'map')} of {counted(a['cells'], 'start')}"
-    lines = [f"{', '.join(spans)}: {said}, {counted(len(every), 'attractor')}."]
+    counts = f"{counted(a['models'], 'map')} of {counted(a['cells'], 'start')}"
+    lines = [f"{', '.join(spans)}: {counts}, {counted(len(every), 'attractor')}."]
     most = sorted(every, key=lambda one: -one["largest_fraction"])
     for one in most[:_LISTED]:
-        ends = [span(dim, *own) for dim, own in one["ranges"].items()]
+        ends = [span(dim, *limits) for dim, limits in one["ranges"].items()]
         share = percent(100 * one["largest_fraction"])
         bound = bound_said(one["largest_fraction"], a["cells"])
         lines.append(f"{one['name']}: {', '.join(ends)}, up to {share} of the starts{bound}.")

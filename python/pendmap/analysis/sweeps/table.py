@@ -88,10 +88,13 @@ def sweep_dataset(  # noqa: PLR0913, PLR0917 (the parts of a sweep)
             comment="number of the attractor; 0 undecided within the bound, -1 failed or diverged",
             flags=dict(enumerate(["failed", "undecided", *names], -1)),
         ),
-        **{name: variable(dims, measured[key], *said) for key, (name, *said) in MEASURES.items()},
         **{
-            name: variable(dims, np.nan_to_num(measured[key]).astype(np.int32), *said)
-            for key, (name, *said) in COUNTS.items()
+            name: variable(dims, measured[key], *description)
+            for key, (name, *description) in MEASURES.items()
+        },
+        **{
+            name: variable(dims, np.nan_to_num(measured[key]).astype(np.int32), *description)
+            for key, (name, *description) in COUNTS.items()
         },
         "plane": flag(
             dims, measured["plane"], "what the plane of starts shows", dict(enumerate(PLANES))
@@ -120,7 +123,7 @@ def _table(
     """Return the names of the attractors, and their variables."""
     dims = (*(axis.name for axis in axes), "attractor")
     shape = tuple(axis.values.size for axis in axes)
-    count = 1 + max((k for own in numbers.values() for k in own), default=-1)
+    count = 1 + max((k for indices in numbers.values() for k in indices), default=-1)
     whole = {key: np.zeros((*shape, count), dtype=np.int32) for key in ("kind", *DESCRIBED)}
     real = {key: np.full((*shape, count), np.nan) for key in ("exponent", "exponent_stderr")}
     fraction = np.zeros((*shape, count))
@@ -130,23 +133,23 @@ def _table(
     first: dict[int, Place] = {}
     points: list[tuple[float, ...]] = []
     for at, place in enumerate(np.ndindex(*shape)):
-        for own, k in zip(maps[place].found, numbers[place], strict=True):
+        for attractor, k in zip(maps[place].found, numbers[place], strict=True):
             here = (*place, k)
             for key in DESCRIBED:
-                whole[key][here] = getattr(own, key)
-            whole["kind"][here] = KINDS.index(own.kind)
+                whole[key][here] = getattr(attractor, key)
+            whole["kind"][here] = KINDS.index(attractor.kind)
             real["exponent"][here], real["exponent_stderr"][here] = (
-                own.exponent,
-                own.exponent_stderr,
+                attractor.exponent,
+                attractor.exponent_stderr,
             )
-            fraction[here] = own.fraction
-            if own.n:
-                closed[here] = own.points[0]
+            fraction[here] = attractor.fraction
+            if attractor.n:
+                closed[here] = attractor.points[0]
             first.setdefault(k, place)
-            called.setdefault(k, Counter())[own.described] += 1
-            if own.twin and not twin[k]:
-                twin[k] = numbers[place][own.twin - 1] + 1
-            points += [(at, k + 1, *point) for point in own.points.tolist()]
+            called.setdefault(k, Counter())[attractor.described] += 1
+            if attractor.twin and not twin[k]:
+                twin[k] = numbers[place][attractor.twin - 1] + 1
+            points += [(at, k + 1, *point) for point in attractor.points.tolist()]
     # What it is called in most of the models, the first of equally frequent names.
     most = [_core.Attractor(*called[k].most_common(1)[0][0]) for k in range(count)]
     names = _names([one.name for one in most], [first[k] for k in range(count)], axes)
@@ -183,9 +186,11 @@ def _table(
         ),
         **{
             f"point_{axis.name}": variable(
-                "point", axis.values[own], axis.unit or "1", f"{axis.name} of the model"
+                "point", axis.values[index], axis.unit or "1", f"{axis.name} of the model"
             )
-            for axis, own in zip(axes, np.unravel_index(flat[:, 0].astype(int), shape), strict=True)
+            for axis, index in zip(
+                axes, np.unravel_index(flat[:, 0].astype(int), shape), strict=True
+            )
         },
         "point_attractor": variable(
             "point", flat[:, 1].astype(np.int32), "1", "number of the attractor"
@@ -197,13 +202,13 @@ def _table(
 
 def _names(names: list[str], first: list[Place], axes: Sequence[Varied]) -> list[str]:
     """Return names of which no two are the same: where each one appears tells equal ones apart."""
-    found: list[str] = []
+    distinct: list[str] = []
     for name, place in zip(names, first, strict=True):
         at = ", ".join(span(a.name, *a.values[[k, k]]) for a, k in zip(axes, place, strict=True))
-        told = name if names.count(name) == 1 else f"{name} from {at}"
+        candidate = name if names.count(name) == 1 else f"{name} from {at}"
         number = 2
-        while told in found:
-            told = f"{name} from {at} ({number})"
+        while candidate in distinct:
+            candidate = f"{name} from {at} ({number})"
             number += 1
-        found.append(told)
-    return found
+        distinct.append(candidate)
+    return distinct

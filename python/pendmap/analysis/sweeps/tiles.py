@@ -119,8 +119,8 @@ class SweepTiles:
         """Return the model at a place; between two values where it is no whole number."""
         values: dict[str, float] = {}
         for at, axis in zip(place, self.varied, strict=True):
-            for name, own in axis:  # what two axes have is a product, as in the core
-                here = float(np.interp(at, np.arange(len(own)), own))
+            for name, levels in axis:  # what two axes have is a product, as in the core
+                here = float(np.interp(at, np.arange(len(levels)), levels))
                 values[name] = values.get(name, 1.0) * here
         return with_values(self.pendulum, values)  # type: ignore[return-value]
 
@@ -139,7 +139,7 @@ class SweepTiles:
         places, plan = self.places(tile), None
         maps: list[_Map] = []
         for k, place in enumerate(places):
-            search, labels = (part(progress, 2 * k + own, 2 * len(places)) for own in (0, 1))
+            search, labels = (part(progress, 2 * k + half, 2 * len(places)) for half in (0, 1))
             if search is not None:
                 search(0, 1)
             one, model = _Map((self.axes[1][2], self.axes[0][2])), self.model(place)
@@ -152,10 +152,10 @@ class SweepTiles:
     def run(self, work: Work) -> dict[Place, Mapped]:
         """Compute the blocks that are missing; return the maps of all by their places."""
         work.once(_STATE, lambda: b"none")
-        found: dict[Place, Mapped] = {}
+        maps: dict[Place, Mapped] = {}
         for tile, record in work.each(STEP, _STATE, range(self.blocks)):
-            found |= _of_block(self, tile, record)
-        return {place: found[place] for tile in range(self.blocks) for place in self.places(tile)}
+            maps |= _of_block(self, tile, record)
+        return {place: maps[place] for tile in range(self.blocks) for place in self.places(tile)}
 
     def labels(self, store: Store, row: int) -> Iterator[tuple[Place, NDArray[np.int16]]]:
         """Yield the labels of the blocks in a row along the first parameter, by their places."""
@@ -173,17 +173,17 @@ class _Map:
 
     def take(self, plan: _core.BasinPlan, progress: Any, *, check: bool) -> None:  # noqa: ANN401
         """Compute it."""
-        found, texture = plan.map(progress)
-        counts = np.bincount(found.label + 1, minlength=2)
+        cells, texture = plan.map(progress)
+        counts = np.bincount(cells.label + 1, minlength=2)
         measures: dict[str, float | None] = dict.fromkeys(MEASURES, math.nan)
         labelled = plan.plane == PLANES[0]
         if labelled and check:
-            reliable = plan.reliability(found.label[plan.checked_starts()])
+            reliable = plan.reliability(cells.label[plan.checked_starts()])
             measures |= {name: getattr(reliable, name) for name in MEASURES[-4:]}
         attractors, moved = plan.finish(np.ascontiguousarray(counts[2:]))
-        self.label = np.concatenate([[-1, 0], moved]).astype(np.int16)[found.label + 1]
+        self.label = np.concatenate([[-1, 0], moved]).astype(np.int16)[cells.label + 1]
         self.attractors = attractors
-        size = found.label.size
+        size = cells.label.size
         measures |= {name: getattr(texture, name) for name in MEASURES[:5]}
         if labelled:
             measures |= self._exponent(self.shape)
@@ -197,7 +197,7 @@ class _Map:
             "searched": plan.searched_starts,
             "steps": plan.steps_per_period,
             "reached_error": plan.reached_error,
-            "periods": found.work / size,
+            "periods": cells.work / size,
         }
         self.measures = [math.nan if x is None else float(x) for x in measures.values()]
 
@@ -214,8 +214,8 @@ def _packed(maps: list[_Map]) -> bytes:
     """Return the maps of a block as a record."""
     every = [(k, a) for k, one in enumerate(maps) for a in one.attractors]
     number = [k + 1 for one in maps for k in range(len(one.attractors))]
-    kept = [_spread(a.points, a.n) for _, a in every]
-    points = np.array([p for own in kept for p in own], dtype=float).reshape(-1, 2)
+    groups = [_spread(a.points, a.n) for _, a in every]
+    points = np.array([p for group in groups for p in group], dtype=float).reshape(-1, 2)
     columns = {
         name: np.array([getattr(a, name) for _, a in every])
         for name in ("kind", "exponent", "exponent_stderr", "fraction")
@@ -229,7 +229,7 @@ def _packed(maps: list[_Map]) -> bytes:
         measures=np.array([one.measures for one in maps]),
         owner=np.array([k for k, _ in every], dtype=np.int32),
         number=np.array(number, dtype=np.int32),
-        count=np.array([len(own) for own in kept], dtype=np.int32),
+        count=np.array([len(group) for group in groups], dtype=np.int32),
         points=points,
         **columns,
         **whole,
@@ -288,10 +288,10 @@ def _of_block(job: SweepTiles, tile: int, data: bytes) -> Iterator[tuple[Place, 
     columns = [read[key].tolist() for key in keys]
     points = np.split(read["points"], ends[:-1]) if ends.size else []
     every = [
-        Found(**dict(zip(keys, values, strict=True)), points=own)
-        for *values, own in zip(*columns, points, strict=True)
+        Found(**dict(zip(keys, values, strict=True)), points=states)
+        for *values, states in zip(*columns, points, strict=True)
     ]
     for k, place in enumerate(job.places(tile)):
-        own = [every[m] for m in np.flatnonzero(read["owner"] == k)]
+        attractors = [every[m] for m in np.flatnonzero(read["owner"] == k)]
         measures = dict(zip(MEASURES, read["measures"][k].tolist(), strict=True))
-        yield place, Mapped(measures, own)
+        yield place, Mapped(measures, attractors)
