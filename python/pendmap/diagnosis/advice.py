@@ -44,7 +44,7 @@ class Advice:
 
 
 def detection_limits(
-    scores: Scores, level: float, found: FittedModel, chance: float
+    scores: Scores, level: float, fitted: FittedModel, chance: float
 ) -> dict[str, Limit]:
     """Return the smallest size of each effect that would have been found with 95 % probability.
 
@@ -59,7 +59,7 @@ def detection_limits(
     shapes: dict[str, list[tuple[float, Candidate]]] = {}
     for score in scores.scores:
         candidate = score.candidate
-        if candidate.name in found.names:
+        if candidate.name in fitted.names:
             continue
         among = len(choices) * choices[candidate.name]
         threshold = float(chdtri(candidate.count, chance / among))
@@ -68,7 +68,7 @@ def detection_limits(
         size = math.sqrt(wanted / shown) if shown > 0 else math.inf
         most = max(map(abs, candidate.definition.parameters[0].typical))
         if size > UNDETECTABLE * abs(
-            candidate.effect(found.fit.model.units, most).parameters[candidate.size]
+            candidate.effect(fitted.fit.model.units, most).parameters[candidate.size]
         ):
             size = math.inf
         shapes.setdefault(candidate.name, []).append((size, candidate))

@@ -44,11 +44,11 @@ def fit_baseline(
     Damping may be negative, since a bound stalls the fit.
     """
     if model is not None:
-        own = _unfolded(model)
-        free = ["w0", "c_over_m", *(n for n in ("Tr", "torque") if getattr(own, n) != 0)]
-        acting = [effect for effect in own.effects if data.forced or not effect.drives]
+        rig = _unfolded(model)
+        free = ["w0", "c_over_m", *(n for n in ("Tr", "torque") if getattr(rig, n) != 0)]
+        acting = [effect for effect in rig.effects if data.forced or not effect.drives]
         sizes = [f"{effect.name}.{size}" for effect in acting for size in effect.sizes]
-        base = fit_model(data, own, [*free, *sizes])
+        base = fit_model(data, rig, [*free, *sizes])
     else:
         free = ["w0", "c_over_m", "Tr"]
         first = _start(data)
@@ -89,22 +89,22 @@ def _through_all(data: DataSplit, start: Rig, free: list[str]) -> FittedModel | 
     whole = list(data.fitted)
     for run, k in zip(data.held, data.held_of, strict=True):
         place = data.fitted_of.index(k)
-        own = whole[place]
-        if own.trusted is not None and run.trusted is not None:
-            whole[place] = dataclasses.replace(own, trusted=own.trusted | run.trusted)
+        fitted_run = whole[place]
+        if fitted_run.trusted is not None and run.trusted is not None:
+            whole[place] = dataclasses.replace(fitted_run, trusted=fitted_run.trusted | run.trusted)
     return fit_again(data, fit_model(dataclasses.replace(data, fitted=tuple(whole)), start, free))
 
 
 def _unfolded(model: Rig) -> Rig:
     """Return a model with effects that equal a parameter of the rig replaced by it."""
-    own, effects = {}, []
+    parameters, effects = {}, []
     for effect in model.effects:
         name = own_name(effect.name)
         if name is None:
             effects.append(dataclasses.replace(effect, ci95={}, probability=None, approximate=None))
         else:
-            own[name] = effect.values[0]
-    return dataclasses.replace(model, **own, effects=tuple(effects), p=0.0, notes={})
+            parameters[name] = effect.values[0]
+    return dataclasses.replace(model, **parameters, effects=tuple(effects), p=0.0, notes={})
 
 
 def _start(data: DataSplit) -> Rig:

@@ -78,9 +78,9 @@ class Candidate:
     @property
     def free(self) -> list[str]:
         """Names of its size and phase in a fit."""
-        own = own_name(self.name)
+        parameter = own_name(self.name)
         names = [self.size] if self.phase is None else [self.size, self.phase]
-        return [own] if own else [f"{self.name}.{name}" for name in names]
+        return [parameter] if parameter else [f"{self.name}.{name}" for name in names]
 
     @property
     def adapted(self) -> list[str]:
@@ -159,10 +159,10 @@ def add_candidates(model: Rig, added: Sequence[Candidate]) -> Rig:
     if not effects:
         return model
     names = {effect.name for effect in effects}
-    kept = [effect for effect in model.effects if effect.name not in names]
+    others = [effect for effect in model.effects if effect.name not in names]
     # Runs have their own drives; the model only needs some frequency.
     omega = model.Omega or float(any(effect.drives for effect in effects))
-    return dataclasses.replace(model, effects=(*kept, *effects), Omega=omega)
+    return dataclasses.replace(model, effects=(*others, *effects), Omega=omega)
 
 
 def checked_own(effects: Sequence[object]) -> tuple[Formula, ...]:
@@ -199,23 +199,23 @@ def list_candidates(
     *,
     driven: bool,
     without: Collection[str] = (),
-    own: Collection[Formula] = (),
+    user_formulas: Collection[Formula] = (),
 ) -> list[list[Candidate]]:
     """Return the candidates by effect, each in all its shapes.
 
     Effects equivalent to those in ``taken`` (names of effects and of a Rig's fitted parameters) and
     those in ``without`` are left out. Effects of the drive need a harmonic drive.
     """
-    formulas = {formula.name: formula for formula in own}
-    found = []
+    formulas = {formula.name: formula for formula in user_formulas}
+    candidates = []
     entries = library() | {name: formula.definition for name, formula in formulas.items()}
     for name, entry in entries.items():
         if name in taken or name in without or own_name(name) in taken:
             continue
         if entry.group == "drive" and not driven:
             continue
-        found.append([Candidate(name, shape, formulas.get(name)) for shape in _shapes(entry)])
-    return found
+        candidates.append([Candidate(name, shape, formulas.get(name)) for shape in _shapes(entry)])
+    return candidates
 
 
 def _shapes(entry: EffectDefinition) -> Iterator[dict[str, float]]:

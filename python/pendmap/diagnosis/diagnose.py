@@ -102,7 +102,7 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
     ('named', ['quadratic_drag'])
     """
     experiment = experiment_of(records, rate_hz=rate_hz)
-    own = checked_own(effects)
+    formulas = checked_own(effects)
     check_whole("max_effects", max_effects, 0, 6)
     moved = in_rounds(progress, _FITS) or (lambda _done, _total: None)
     data = split_records(experiment)
@@ -111,7 +111,7 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
     # Windows are as long as those over which the baseline followed the runs.
     data = dataclasses.replace(data, fitted=base.runs)
     moved(1, 1)
-    state = State(data, base, thresholds or Thresholds(), max_effects, without, own=own)
+    state = State(data, base, thresholds or Thresholds(), max_effects, without, formulas=formulas)
     state.moved = lambda: moved(1, 1)
     with _refuse_divergence(experiment):
         last = search(state, core)
@@ -171,7 +171,7 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
         nearest.fitted.level,
         tuple(without),
         max_effects,
-        own,
+        formulas,
         reasons,
     )
 

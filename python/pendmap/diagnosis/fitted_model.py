@@ -94,8 +94,8 @@ class FittedModel:
     @property
     def taken(self) -> set[str]:
         """Names of the model's effects and of its fitted parameters."""
-        own = {name.partition("[")[0] for name in self.free}
-        return {effect.name for effect in self.fit.model.effects} | own
+        parameters = {name.partition("[")[0] for name in self.free}
+        return {effect.name for effect in self.fit.model.effects} | parameters
 
     @property
     def start(self) -> dict[str, float]:
@@ -106,11 +106,11 @@ class FittedModel:
         """Return the start of a fit with some parameters at 0, the others moved by covariance."""
         start = self.start
         places = [self.fit.names.index(name) for name in names if name in self.fit.names]
-        own = self.fit.covariance[np.ix_(places, places)]
+        block = self.fit.covariance[np.ix_(places, places)]
         column = self.fit.covariance[:, places]
-        if places and np.isfinite(self.fit.covariance).all() and np.linalg.matrix_rank(own):
+        if places and np.isfinite(self.fit.covariance).all() and np.linalg.matrix_rank(block):
             values = np.array([start[self.fit.names[k]] for k in places])
-            moved = column @ (np.linalg.pinv(own, hermitian=True) @ values)
+            moved = column @ (np.linalg.pinv(block, hermitian=True) @ values)
             start |= {n: start[n] - m for n, m in zip(self.fit.names, moved, strict=True)}
         return {name: value for name, value in start.items() if name not in names}
 

@@ -95,15 +95,15 @@ def _without(run: FitRun, number: int) -> FitRun:
     """
     if run.forced:
         return run
-    kept = run.counted.copy()
-    samples = np.flatnonzero(kept)
+    trusted = run.counted.copy()
+    samples = np.flatnonzero(trusted)
     n, k = samples.size, np.arange(samples.size)
     if number < FOLDS:
         part = 2 * FOLDS * k // max(n, 1) % FOLDS == number
     else:
         part = k < n // 3 if number == FOLDS else k >= n - n // 3 - 1
-    kept[samples[part]] = False
-    return dataclasses.replace(run, trusted=kept)
+    trusted[samples[part]] = False
+    return dataclasses.replace(run, trusted=trusted)
 
 
 def _chi2(

@@ -47,7 +47,9 @@ class NamedEffect:
     @property
     def reaches_0(self) -> bool:
         """Whether the interval of its size contains 0, or values below where it opposes."""
-        size = next(each.name for each in self.definition.parameters if each.role == "size")
+        size = next(
+            parameter.name for parameter in self.definition.parameters if parameter.role == "size"
+        )
         low, high = self.ci95.get(size, (math.nan, math.nan))
         return low <= 0 <= high or (self.definition.opposing == size and low <= 0)
 
@@ -79,8 +81,8 @@ def name_effects(
     }
     others = find_equivalents(data, best.fitted, sought)
     named = []
-    for each, sure in zip(assessment.identified, assessment.probabilities, strict=True):
-        candidate = each.candidate
+    for effect, sure in zip(assessment.identified, assessment.probabilities, strict=True):
+        candidate = effect.candidate
         if candidate.name not in best.fitted.names:
             continue
         parameters, errors = effect_values(best, candidate)
@@ -98,9 +100,9 @@ def name_effects(
                 candidate.name,
                 parameters,
                 ci95,
-                each.share * sure,
+                effect.share * sure,
                 assessment.approximate or bool(doubt_keys(data.experiment, *data.runs)),
-                each.closed,
+                effect.closed,
                 candidate.formula,
                 others.get(candidate.name, {}),
             )
@@ -113,9 +115,11 @@ def effect_values(
 ) -> tuple[dict[str, float], dict[str, float]]:
     """Return parameters and standard errors of an effect; with a phase its size is positive."""
     estimates = best.fitted.fit.estimates
-    own = own_name(candidate.name)
-    if own is not None:
-        return {candidate.size: estimates[own].value}, {candidate.size: estimates[own].stderr or 0}
+    parameter = own_name(candidate.name)
+    if parameter is not None:
+        return {candidate.size: estimates[parameter].value}, {
+            candidate.size: estimates[parameter].stderr or 0
+        }
     effect = next(e for e in best.fitted.fit.model.effects if e.name == candidate.name)
     errors = {
         name: estimates[key].stderr or math.inf

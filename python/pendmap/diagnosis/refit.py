@@ -62,9 +62,9 @@ def refit_with(  # noqa: PLR0913, PLR0917 (what is fitted, and what decides)
     The fit starts at the fitted motion with sizes of nearly 0, in the shapes of the best scores; if
     it gains far less than the score promised, it is repeated from the sizes of the score.
     """
-    own = [scores.scores[k] for k in places]
-    added = [score.candidate for score in own]
-    step = {name: value for score in own for name, value in score.start.items()}
+    selected = [scores.scores[k] for k in places]
+    added = [score.candidate for score in selected]
+    step = {name: value for score in selected for name, value in score.start.items()}
     sizes = {candidate.free[0] for candidate in added}
 
     def fit(
@@ -77,22 +77,22 @@ def refit_with(  # noqa: PLR0913, PLR0917 (what is fitted, and what decides)
         start = {name: KICK * v if kick and name in sizes else v for name, v in step.items()}
         return fit_with_candidates(data, fitted, added, start, level=level, short=short)
 
-    found = fit(added, step, kick=True)
+    best = fit(added, step, kick=True)
     for k in _other_shapes(scores, places, thresholds):
         other = scores.scores[k]
-        found = best_of(found, fit([other.candidate], other.start, kick=True))
+        best = best_of(best, fit([other.candidate], other.start, kick=True))
     promised = thresholds.short * scores.together(places)
-    if found is None or fitted.chi2 - found.chi2 < promised:
-        found = best_of(found, fit(added, step))
-    if found is None or found.chi2 > fitted.chi2:
+    if best is None or fitted.chi2 - best.chi2 < promised:
+        best = best_of(best, fit(added, step))
+    if best is None or best.chi2 > fitted.chi2:
         # A larger model fits at least as well: the fit lost the motion.
-        found = best_of(found, fit(added, step, short=True))
-    if found is None or found.chi2 > fitted.chi2:
+        best = best_of(best, fit(added, step, short=True))
+    if best is None or best.chi2 > fitted.chi2:
         return None
-    found = impose_physics(data, try_mirrored_places(data, found), fitted.chi2)
-    if found is None or found.chi2 > fitted.chi2 or not {c.name for c in added} <= {*found.names}:
+    best = impose_physics(data, try_mirrored_places(data, best), fitted.chi2)
+    if best is None or best.chi2 > fitted.chi2 or not {c.name for c in added} <= {*best.names}:
         return None
-    return found
+    return best
 
 
 def _other_shapes(scores: Scores, places: Sequence[int], thresholds: Thresholds) -> list[int]:
@@ -156,8 +156,8 @@ def add_effects(
     added = [c for c in chosen if c.name not in reduced.names]
     known = {name: full.start.get(name, 0.0) for c in added for name in c.free}
     start = known | {c.free[0]: KICK * known[c.free[0]] for c in added}
-    found = fit_with_candidates(data, reduced, added, start, level=level)
-    return None if found is None else impose_physics(data, found)
+    fit = fit_with_candidates(data, reduced, added, start, level=level)
+    return None if fit is None else impose_physics(data, fit)
 
 
 def try_mirrored_places(data: DataSplit, fitted: FittedModel) -> FittedModel:
@@ -180,7 +180,7 @@ def find_equivalents(
 
     They are mirrored places, and other frequencies or instants from ``sought``.
     """
-    found: dict[str, dict[str, float]] = {}
+    equivalents: dict[str, dict[str, float]] = {}
     for candidate in fitted.chosen:
         starts = _mirrored(fitted, candidate)
         for score in sought.get(candidate.name, ()):
@@ -193,16 +193,16 @@ def find_equivalents(
                 continue
             for key in starts[0]:
                 here, there = fitted.fit.estimates[key], other.fit.estimates[key]
-                apart, own = abs(there.value - here.value), key.rpartition(".")[2]
-                if own in candidate.places:
+                apart, parameter = abs(there.value - here.value), key.rpartition(".")[2]
+                if parameter in candidate.places:
                     apart = abs(math.remainder(apart, math.tau)) - abs(here.value)
-                elif own in candidate.shape:
+                elif parameter in candidate.shape:
                     apart -= Z95 * math.hypot(here.stderr or 0.0, there.stderr or 0.0)
                 else:
                     continue
                 if apart > 0:
-                    found.setdefault(candidate.name, {})[own] = there.value
-    return found
+                    equivalents.setdefault(candidate.name, {})[parameter] = there.value
+    return equivalents
 
 
 def _mirrored(fitted: FittedModel, candidate: Candidate) -> list[dict[str, float]]:
@@ -219,9 +219,9 @@ def _fit_from(
     steps: int,
 ) -> FittedModel | None:
     """Return the fit from another start of an effect; None if it diverges."""
-    own = {key.rpartition(".")[2]: value for key, value in start.items()}
+    values = {key.rpartition(".")[2]: value for key, value in start.items()}
     effects = tuple(
-        dataclasses.replace(e, parameters={**e.parameters, **own})
+        dataclasses.replace(e, parameters={**e.parameters, **values})
         if e.name == candidate.name
         else e
         for e in fitted.fit.model.effects
@@ -247,7 +247,7 @@ def profile_intervals(
     names = [name for name in wanted if name in fitted.fit.names and name not in fitted.fit.mixed]
     if not names or not fitted.fit.converged:
         return {}
-    found = fit_runs(
+    profile = fit_runs(
         data.fitted,
         fitted.fit.model,
         fitted.free,
@@ -255,16 +255,16 @@ def profile_intervals(
         windows=fitted.fit.windows,
         profiled=names,
     )
-    wider = math.sqrt(fitted.widening / found.widening)
+    wider = math.sqrt(fitted.widening / profile.widening)
     intervals: dict[str, dict[str, tuple[float, float]]] = {}
     for key in names:
         effect, name = wanted[key]
-        value = found[key]
+        value = profile[key]
         half = Z95 * math.sqrt(fitted.widening) * (fitted.fit.estimates[key].stderr or math.inf)
         # An end that the profile does not have is taken from the covariance.
         low, high = (
             value + wider * (end - value) if math.isfinite(end) else value + side * half
-            for end, side in zip(found.ends[key], (-1, 1), strict=True)
+            for end, side in zip(profile.ends[key], (-1, 1), strict=True)
         )
         if math.isfinite(low) and math.isfinite(high):
             intervals.setdefault(effect, {})[name] = low, high

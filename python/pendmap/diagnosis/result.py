@@ -117,9 +117,9 @@ class Discrepancy(FitResult):
     def __repr__(self) -> str:
         names = ", ".join(effect.name for effect in self.effects)
         gap = f"rms {self.gap.before:.3g} to {self.gap.after:.3g} rad"
-        said = f"{self.verdict}: {names}" if names else self.verdict
+        verdict = f"{self.verdict}: {names}" if names else self.verdict
         path = self.data.experiment.path.name
-        return f"<Discrepancy {path}: {said}; {gap}, noise {self.gap.noise_floor:.3g}>"
+        return f"<Discrepancy {path}: {verdict}; {gap}, noise {self.gap.noise_floor:.3g}>"
 
     def text_parts(self) -> tuple[list[tuple[list[str], list[list[str]]]], list[str]]:
         """Return the table and the lines that ``pendmap diagnose`` prints."""
@@ -129,29 +129,29 @@ class Discrepancy(FitResult):
     def parameters(self) -> Mapping[str, Estimate]:
         """Parameters of the best model; intervals include what differs between runs."""
         fit, wider = self.best.fitted.fit, math.sqrt(self.best.fitted.widening)
-        found = {}
+        estimates = {}
         for name, written in zip(fit.names, self.written_names, strict=True):
             value, stderr = fit[name], wider * (fit.estimates[name].stderr or math.nan)
             half = Z95 * math.hypot(stderr, self.runs.between(name))
             known = math.isfinite(half)
             ci95 = (value - half, value + half) if known else None
-            found[written] = Estimate(value, stderr if known else None, ci95)
+            estimates[written] = Estimate(value, stderr if known else None, ci95)
         for effect in self.effects:
-            for own, value in effect.parameters.items():
-                name = f"{effect.name}.{own}"
-                known_error = found[name].stderr if name in found else None
-                found[name] = Estimate(value, known_error, effect.ci95.get(own))
-        return found
+            for parameter, value in effect.parameters.items():
+                name = f"{effect.name}.{parameter}"
+                known_error = estimates[name].stderr if name in estimates else None
+                estimates[name] = Estimate(value, known_error, effect.ci95.get(parameter))
+        return estimates
 
     @property
     def written_names(self) -> list[str]:
         """Names of the fitted parameters in the model file, where named effects are effects."""
-        own = {
+        renamed = {
             rig: f"{effect.name}.{next(iter(effect.parameters))}"
             for effect in self.effects
             if (rig := own_name(effect.name)) is not None
         }
-        return [own.get(name, name) for name in self.best.fitted.fit.names]
+        return [renamed.get(name, name) for name in self.best.fitted.fit.names]
 
     @property
     def joint_covariance(self) -> Covariance:
@@ -161,13 +161,13 @@ class Discrepancy(FitResult):
         """
         fitted, names = self.best.fitted, self.written_names
         sizes = {
-            f"{effect.name}.{own}": value
+            f"{effect.name}.{parameter}": value
             for effect in self.effects
-            for own, value in effect.parameters.items()
-            if self.definition(effect.name)[own].role == "size"
+            for parameter, value in effect.parameters.items()
+            if self.definition(effect.name)[parameter].role == "size"
         }
         pairs = zip(names, fitted.fit.names, strict=True)
-        signs = [-1.0 if sizes.get(name, 0.0) * fitted.fit[own] < 0 else 1.0 for name, own in pairs]
+        signs = [-1.0 if sizes.get(name, 0.0) * fitted.fit[key] < 0 else 1.0 for name, key in pairs]
         return names, fitted.widening * fitted.fit.covariance * np.outer(signs, signs)
 
     @property
@@ -181,7 +181,7 @@ class Discrepancy(FitResult):
         fit, (names, covariance) = self.best.fitted.fit, self.joint_covariance
         named = {effect.name: effect.effect for effect in self.effects}
         # An effect that is a parameter of the rig is written as an effect.
-        own = [rig for name in named if (rig := own_name(name)) is not None]
+        parameters = [rig for name in named if (rig := own_name(name)) is not None]
         effects = (*(e for e in fit.model.effects if e.name not in named), *named.values())
         still = fit.model.p == 0 and not any(e.drives for e in effects)
         between = {
@@ -192,7 +192,7 @@ class Discrepancy(FitResult):
         matrix = np.where(np.isfinite(covariance), covariance, 0.0).tolist()
         return dataclasses.replace(
             fit.model,
-            **dict.fromkeys(own, 0.0),
+            **dict.fromkeys(parameters, 0.0),
             effects=effects,
             Omega=0.0 if still else (fit.model.Omega or 1.0),
             notes={"covariance": {"names": list(names), "matrix": matrix, "between_runs": between}},
@@ -223,7 +223,7 @@ class Discrepancy(FitResult):
         """Classes of indistinguishable effects, one for each named effect that has one."""
         if not self.effects:
             return []
-        classes = (each.equivalent for each in self.assessment.identified)
+        classes = (effect.equivalent for effect in self.assessment.identified)
         return [names for names in classes if len(names) > 1]
 
     @property
@@ -262,36 +262,36 @@ class Discrepancy(FitResult):
         return compare_cycles(self.data, self.base.fits, self.best.fits, self.reasons)
 
 
-def shape_text(found: Discrepancy, candidate: Candidate) -> str:
+def shape_text(result: Discrepancy, candidate: Candidate) -> str:
     """Return the shape of a candidate in SI, with units."""
-    shape = candidate.shape_in(found.base.fitted.fit.model.units)
+    shape = candidate.shape_in(result.base.fitted.fit.model.units)
     return ", ".join(
-        f"{name} = {value:.3g} {unit_of(f'{candidate.name}.{name}', found.definition)}".rstrip()
+        f"{name} = {value:.3g} {unit_of(f'{candidate.name}.{name}', result.definition)}".rstrip()
         for name, value in shape.items()
     )
 
 
-def ranking_table(found: Discrepancy) -> tuple[list[str], list[list[str]]]:
+def ranking_table(result: Discrepancy) -> tuple[list[str], list[list[str]]]:
     """Return header and rows of the table of candidates at the baseline."""
-    refitted = {a.effects[0]: a for a in reversed(found.attempts) if a.stage == 0}
+    refitted = {a.effects[0]: a for a in reversed(result.attempts) if a.stage == 0}
     rows = []
-    for k, row in zip(found.scores.best()[:RANKED], ranking(found), strict=False):
+    for k, row in zip(result.scores.best()[:RANKED], ranking(result), strict=False):
         name, tried = row["name"], refitted.get(row["name"])
-        shape = shape_text(found, found.scores.scores[k].candidate)
+        shape = shape_text(result, result.scores.scores[k].candidate)
         gains = (None, None) if tried is None else (tried.bic_gain, tried.held_out_gain)
-        said = ["" if gain is None else f"{gain:.1f}" for gain in gains]
-        rows.append([name, shape, f"{row['score']:.1f}", *said])
+        cells = ["" if gain is None else f"{gain:.1f}" for gain in gains]
+        rows.append([name, shape, f"{row['score']:.1f}", *cells])
     return ["candidate", "shape", "score G", "fall of BIC", "gain held out"], rows
 
 
-def as_text(found: Discrepancy) -> Iterator[str]:
+def as_text(result: Discrepancy) -> Iterator[str]:
     """Yield the lines of a summary: doubts about a unit, then the verdict and its details."""
-    runs = found.data.runs
-    yield from doubt_lines(found.data.experiment, *runs)
-    gap, assessment = found.gap, found.assessment
-    yield f"Verdict: {found.verdict}: {SAID[found.verdict]}"
-    for effect in found.effects:
-        units = {n: unit_of(f"{effect.name}.{n}", found.definition) for n in effect.parameters}
+    runs = result.data.runs
+    yield from doubt_lines(result.data.experiment, *runs)
+    gap, assessment = result.gap, result.assessment
+    yield f"Verdict: {result.verdict}: {SAID[result.verdict]}"
+    for effect in result.effects:
+        units = {n: unit_of(f"{effect.name}.{n}", result.definition) for n in effect.parameters}
         values = ", ".join(
             f"{name} = {value:.4g} {units[name]}".rstrip()
             + (" [{:.4g}, {:.4g}]".format(*effect.ci95[name]) if name in effect.ci95 else "")
@@ -306,92 +306,92 @@ def as_text(found: Discrepancy) -> Iterator[str]:
             f"is in the library{nearly}"
         )
         for name, value in effect.elsewhere.items():
-            said = f"{name} = {value:.4g} {units[name]}".rstrip()
-            yield f"    or {said}, which fits equally well"
-    for names in found.equivalent:
+            text = f"{name} = {value:.4g} {units[name]}".rstrip()
+            yield f"    or {text}, which fits equally well"
+    for names in result.equivalent:
         yield f"  indistinguishable in these records: {', '.join(names)}"
-    if found.without:
-        yield f"  excluded from the candidates: {', '.join(found.without)}"
-    if found.most == 0 and found.verdict != "none":
+    if result.without:
+        yield f"  excluded from the candidates: {', '.join(result.without)}"
+    if result.most == 0 and result.verdict != "none":
         yield "  no candidate was fitted: at most 0 effects were allowed"
-    if found.verdict == "unknown" and found.nearest.fitted.names:
-        yield f"  nearest effects, not claimed: {', '.join(found.nearest.fitted.names)}"
+    if result.verdict == "unknown" and result.nearest.fitted.names:
+        yield f"  nearest effects, not claimed: {', '.join(result.nearest.fitted.names)}"
     yield (
         f"Residual, rms: {gap.before:.4g} rad before, {gap.after:.4g} after, noise "
         f"{gap.noise_floor:.4g}; held out {gap.held_out_before:.4g} before, "
         f"{gap.held_out_after:.4g} after, noise {gap.held_out_noise_floor:.4g}"
     )
     if assessment.identified:
-        by = "" if found.effects else " by the nearest effects"
+        by = "" if result.effects else " by the nearest effects"
         yield f"Share of the squared gap closed{by}: {100 * max(assessment.closed, 0.0):.0f} %"
-    yield from zeroed(found)
-    yield from _between(found)
-    yield from confined(found)
-    for row in found.clearest[:WHERE]:
+    yield from zeroed(result)
+    yield from _between(result)
+    yield from confined(result)
+    for row in result.clearest[:WHERE]:
         what = "torque along the motion" if row["along_motion"] else "torque"
         yield (
             f"Where: a {what} of {row['torque']:.3g} {TORQUE} is missing {PLACES[row['over']]} "
             f"{row['from']:.3g} to {row['to']:.3g} {row['unit']} ({row['z']:.1f} standard errors)"
         )
-    yield from _further(found)
-    yield from finding_lines(found.data.experiment, *runs)
+    yield from _further(result)
+    yield from finding_lines(result.data.experiment, *runs)
 
 
-def _between(found: Discrepancy) -> Iterator[str]:
+def _between(result: Discrepancy) -> Iterator[str]:
     """Yield a line for each parameter that differs between runs by more than its error."""
-    for name in found.best.fitted.fit.names:
-        between = found.runs.between(name)
+    for name in result.best.fitted.fit.names:
+        between = result.runs.between(name)
         if between > 0:
             yield (
                 f"{name} differs from run to run by {between:.3g} "
-                f"{unit_of(name, found.definition)}".rstrip()
+                f"{unit_of(name, result.definition)}".rstrip()
                 + ", more than its error: intervals include this"
             )
 
 
-def _further(found: Discrepancy) -> Iterator[str]:
+def _further(result: Discrepancy) -> Iterator[str]:
     """Yield the recommended next record, and the parts that were not computed."""
-    if found.advice.next_experiment is not None:
-        yield f"Next: {found.advice.next_experiment}"
-    for field, reason in found.not_computed.items():
+    if result.advice.next_experiment is not None:
+        yield f"Next: {result.advice.next_experiment}"
+    for field, reason in result.not_computed.items():
         yield f"Not computed: {field}: {reason}"
 
 
-def given_out(found: ScoredModel) -> dict[str, float]:
+def given_out(scored: ScoredModel) -> dict[str, float]:
     """Return the parameters of the model file, SI, without those of single runs."""
-    fitted = found.fitted
+    fitted = scored.fitted
     values = {name: value for name, value in fitted.start.items() if "[" not in name}
     for effect in fitted.fit.model.effects:
         values |= {f"{effect.name}.{name}": value for name, value in effect.parameters.items()}
     for candidate in fitted.chosen:
-        parameters, _ = effect_values(found, candidate)
+        parameters, _ = effect_values(scored, candidate)
         values |= {f"{candidate.name}.{name}": value for name, value in parameters.items()}
     return values
 
 
-def confined(found: Discrepancy) -> Iterator[str]:
+def confined(result: Discrepancy) -> Iterator[str]:
     """Yield a line for each effect of the model that no map over initial conditions can include."""
-    for effect in found.best.fitted.fit.model.effects:
+    for effect in result.best.fitted.fit.model.effects:
         if effect.definition.mappable == "no":
             yield f"{effect.name}: supported by simulate, compare and diagnose, but not by maps"
 
 
-def zeroed(found: Discrepancy) -> Iterator[str]:
+def zeroed(result: Discrepancy) -> Iterator[str]:
     """Yield a line for each coefficient fixed at 0."""
-    for name in found.best.fitted.zeroed:
+    for name in result.best.fitted.zeroed:
         yield f"{name} is fixed at 0: the fit would make it negative, which is unphysical"
 
 
-def ranking(found: Discrepancy) -> list[dict[str, Any]]:
+def ranking(result: Discrepancy) -> list[dict[str, Any]]:
     """Return name, shape, score and size of each effect at the baseline, the best first."""
-    level = found.base.fitted.noise.level
+    level = result.base.fitted.noise.level
     rows = []
-    for k in found.scores.best():
-        score = found.scores.scores[k]
+    for k in result.scores.best():
+        score = result.scores.scores[k]
         rows.append(
             {
                 "name": score.candidate.name,
-                "shape": score.candidate.shape_in(found.base.fitted.fit.model.units),
+                "shape": score.candidate.shape_in(result.base.fitted.fit.model.units),
                 "score": score.gain / level,
                 "size": next(iter(score.start.values()), None),
             }

@@ -99,8 +99,8 @@ class Scores:
 
     def together(self, places: Sequence[int]) -> float:
         """Return the expected gain of several candidates together."""
-        own = [c for k in places for c in self.columns[k]]
-        return _gain(self.gram[np.ix_(own, own)], self.pull[own])
+        columns = [c for k in places for c in self.columns[k]]
+        return _gain(self.gram[np.ix_(columns, columns)], self.pull[columns])
 
     def likeness(self, one: int, other: int) -> float:
         """Return the largest canonical correlation between the responses to two candidates."""
@@ -147,11 +147,13 @@ def score_candidates(
     gram, pull, sizes = gram / np.outer(units, units), pull / units, sizes * units
     scores, where, first = [], [], 0
     for candidate in every:
-        own = list(range(first, first + len(candidate.free)))
-        first += len(own)
-        where.append(own)
+        indices = list(range(first, first + len(candidate.free)))
+        first += len(indices)
+        where.append(indices)
         faint = candidate.effect(fitted.fit.model.units).parameters.get(candidate.size, 0.0)
-        scores.append(_scored(candidate, gram[np.ix_(own, own)], pull[own], sizes[own], faint))
+        scores.append(
+            _scored(candidate, gram[np.ix_(indices, indices)], pull[indices], sizes[indices], faint)
+        )
     return Scores(tuple(scores), tuple(where), gram, pull)
 
 
@@ -171,17 +173,17 @@ def candidate_slopes(
     columns = [[window.columns] for window in known]
     for present in passes:
         free = [name for candidate in present for name in candidate.free]
-        found, slopes = window_slopes(fit, runs, free, add_candidates(fit.model, present))
-        wanted = [found.index(name) for name in free]
+        all_names, slopes = window_slopes(fit, runs, free, add_candidates(fit.model, present))
+        wanted = [all_names.index(name) for name in free]
         if not windows:
-            names = [name for name in found if name not in free]
-            wanted = [*map(found.index, names), *wanted]
+            names = [name for name in all_names if name not in free]
+            wanted = [*map(all_names.index, names), *wanted]
             windows, columns = slopes, [[] for _ in slopes]
-        for own, window, one in zip(columns, slopes, windows, strict=True):
-            own.append(window.columns_as_in(one)[:, wanted])
+        for blocks, window, one in zip(columns, slopes, windows, strict=True):
+            blocks.append(window.columns_as_in(one)[:, wanted])
     return names, [
-        dataclasses.replace(window, columns=np.hstack(own))
-        for window, own in zip(windows, columns, strict=True)
+        dataclasses.replace(window, columns=np.hstack(blocks))
+        for window, blocks in zip(windows, columns, strict=True)
     ]
 
 
@@ -192,7 +194,7 @@ def _located(
     model: Rig,
 ) -> list[list[Candidate]]:
     """Return candidates with the frequencies or instants that residuals show most clearly."""
-    found: list[list[Candidate]] = []
+    candidates: list[list[Candidate]] = []
     responses = calm_responses(data.fitted, windows, model.c_over_m) if pool else []
     for one, *_ in pool if responses else ():
         scanned = one.sought
@@ -204,8 +206,8 @@ def _located(
         else:
             values = instants(responses)
         shapes = [{**one.shape, scanned.name: value / unit} for value in values]
-        found.append([dataclasses.replace(one, shape=shape) for shape in shapes])
-    return found
+        candidates.append([dataclasses.replace(one, shape=shape) for shape in shapes])
+    return candidates
 
 
 def _passes(pool: Sequence[Sequence[Candidate]], room: int) -> list[list[Candidate]]:
@@ -259,8 +261,8 @@ def _root_inverse(gram: Floats) -> Floats:
 
 def _orthonormal(columns: Floats) -> Floats:
     sizes = np.linalg.norm(columns, axis=0)
-    kept = columns[:, sizes > 0]
-    if not kept.size:
+    nonzero = columns[:, sizes > 0]
+    if not nonzero.size:
         return np.zeros((len(columns), 0))
-    u, s, _ = np.linalg.svd(kept / sizes[sizes > 0], full_matrices=False)
+    u, s, _ = np.linalg.svd(nonzero / sizes[sizes > 0], full_matrices=False)
     return np.asarray(u[:, s > 1e-7 * s[0]], np.float64)

@@ -79,7 +79,7 @@ def cheapest_start(state: State, core: FittedModel) -> FittedModel:
 
 def _step(state: State, best: FittedModel, starts: Sequence[FittedModel]) -> FittedModel | None:
     """Return the cheapest accepted model with more, or other, effects; None without one."""
-    found: list[tuple[FittedModel, FittedModel, list[int]]] = []
+    refits: list[tuple[FittedModel, FittedModel, list[int]]] = []
     most = state.thresholds.singles
     for reduced in [best, *(s for s in starts if s is not best)]:
         singles, pairs = _promising(state, reduced)
@@ -90,12 +90,12 @@ def _step(state: State, best: FittedModel, starts: Sequence[FittedModel]) -> Fit
             full = state.refit(reduced, places)
             if full is not None:
                 fits += 1
-                found.append((full, reduced, places))
-    if not found:
+                refits.append((full, reduced, places))
+    if not refits:
         return None
-    level = min((full for full, _, _ in found), key=lambda t: t.chi2).level
-    found.sort(key=lambda each: state.cost(each[0], level))
-    for fit, reduced, places in found[:most]:
+    level = min((full for full, _, _ in refits), key=lambda t: t.chi2).level
+    refits.sort(key=lambda entry: state.cost(entry[0], level))
+    for fit, reduced, places in refits[:most]:
         full = state.converge(fit)
         attempt = _attempt(state, best, reduced, full, places)
         state.attempts.append(attempt)

@@ -77,12 +77,12 @@ class State:
         most: int,
         without: Collection[str],
         *,
-        own: Collection[Formula] = (),
+        formulas: Collection[Formula] = (),
     ) -> None:
         self.records = self.data = data
         self.noise = noise_rms(data.fitted)
         self.thresholds, self.most = thresholds, most
-        self.left_out, self.own = without, own
+        self.left_out, self.own = without, formulas
         self.errors = (0.0,) * len(data.fitted)
         self.attempts: list[Attempt] = []
         self.moved: Callable[[], object] = lambda: None  # called after each fit
@@ -122,10 +122,10 @@ class State:
         """Return a model fitted with the present weights of readings."""
         free = [*fitted.free, *fitted.zeroed]
         start = dict.fromkeys(fitted.zeroed, 0.0) | fitted.start
-        found = fit_again(self.data, fitted, free=free, start=start)
-        if found is None or not fitted.chosen:
-            return found
-        return impose_physics(self.data, found) or found
+        fit = fit_again(self.data, fitted, free=free, start=start)
+        if fit is None or not fitted.chosen:
+            return fit
+        return impose_physics(self.data, fit) or fit
 
     @property
     def begun(self) -> FittedModel:
@@ -172,7 +172,7 @@ class State:
     def _candidates(self, fitted: FittedModel) -> list[list[Candidate]]:
         """Return the candidates that a model does not have, each in all its shapes."""
         return list_candidates(
-            fitted.taken, driven=self.data.forced, without=self.left_out, own=self.own
+            fitted.taken, driven=self.data.forced, without=self.left_out, user_formulas=self.own
         )
 
     def refit(self, fitted: FittedModel, places: Sequence[int]) -> FittedModel | None:
@@ -180,8 +180,8 @@ class State:
         scores = self.scores(fitted)
         key = fitted, key_of([scores.scores[k].candidate for k in places])
         if key not in self._refits:
-            found = refit_with(self.data, self.thresholds, fitted, scores, places, self.level)
-            self._refits[key] = self.remember(found)
+            fit = refit_with(self.data, self.thresholds, fitted, scores, places, self.level)
+            self._refits[key] = self.remember(fit)
         return self._refits[key]
 
     def leave_out(self, fitted: FittedModel, dropped: Candidate) -> FittedModel:
@@ -276,10 +276,10 @@ class State:
             full.noise.chance_of(gain, more, full.level if full.level < 1 else 0.0),
             float(fdtrc(more, readings, max(gain, 0.0) / more / full.level)),
         )
-        shapes = [candidate for each in self._candidates(reduced) for candidate in each]
+        shapes = [candidate for group in self._candidates(reduced) for candidate in group]
         choices = count_choices(shapes)
-        own = max((choices.get(c.name, 1) for c in full.chosen), default=1)
-        return min(chance * len(choices) * own, 1.0)
+        shape_choices = max((choices.get(c.name, 1) for c in full.chosen), default=1)
+        return min(chance * len(choices) * shape_choices, 1.0)
 
     def is_significant(self, reduced: FittedModel, full: FittedModel) -> bool:
         """Return whether further effects gain more than chance, and close their share of the gap.

@@ -14,20 +14,20 @@ if TYPE_CHECKING:
     from pendmap.diagnosis.result import Discrepancy
 
 
-def as_json(found: Discrepancy) -> dict[str, Any]:
+def as_json(result: Discrepancy) -> dict[str, Any]:
     """Return the JSON object of ``pendmap diagnose``, without the paths of written files.
 
     Parts that were not computed are null, with the reason in ``not_computed``.
     """
-    unknown = found.not_computed
-    gap, assessment = dataclasses.asdict(found.gap), found.assessment
+    unknown = result.not_computed
+    gap, assessment = dataclasses.asdict(result.gap), result.assessment
     gap_by_run = gap.pop("by_run")
-    fit, base = found.best.fitted.fit, found.base.fitted.fit
-    wider = math.sqrt(found.best.fitted.widening)
+    fit, base = result.best.fitted.fit, result.base.fitted.fit
+    wider = math.sqrt(result.best.fitted.widening)
     return {
-        "experiment": str(found.data.experiment.path),
-        "doubts": doubts(found.data.experiment, *found.data.runs),
-        "verdict": found.verdict,
+        "experiment": str(result.data.experiment.path),
+        "doubts": doubts(result.data.experiment, *result.data.runs),
+        "verdict": result.verdict,
         "effects": [
             {
                 "name": effect.name,
@@ -38,12 +38,12 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
                 "closes": effect.closes,
                 "elsewhere": effect.elsewhere,
             }
-            for effect in found.effects
+            for effect in result.effects
         ],
-        "equivalent": found.equivalent,
+        "equivalent": result.equivalent,
         "gap": {
             **gap,
-            "closed": assessment.closed if found.effects else None,
+            "closed": assessment.closed if result.effects else None,
             "closed_by_nearest": assessment.closed if assessment.identified else None,
             "runs": gap_by_run,
         },
@@ -56,7 +56,7 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
                 "before": forecast.before.tolist(),
                 "after": forecast.after.tolist(),
             }
-            for forecast in found.forecasts
+            for forecast in result.forecasts
         ],
         "cycles": [
             {
@@ -70,14 +70,14 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
                     for what in ("period_rms", "peak_rms")
                 },
             }
-            for one in found.cycles
+            for one in result.cycles
         ],
-        "where": None if "where" in unknown else found.where,
-        "next_experiment": found.advice.next_experiment,
+        "where": None if "where" in unknown else result.where,
+        "next_experiment": result.advice.next_experiment,
         "detection_limits": None
         if "detection_limits" in unknown
-        else {name: limit.size for name, limit in found.advice.limits.items()},
-        "nearest": list(found.nearest.fitted.names),
+        else {name: limit.size for name, limit in result.advice.limits.items()},
+        "nearest": list(result.nearest.fitted.names),
         "left": {
             "z": assessment.left,
             "uneven": assessment.uneven,
@@ -90,18 +90,18 @@ def as_json(found: Discrepancy) -> dict[str, Any]:
             "allowed": assessment.ratio_allowed,
         },
         "baseline": {name: e.value for name, e in base.estimates.items()},
-        "set_to_zero": list(found.best.fitted.zeroed),
-        "model_file": {"rms": fit.rms, "parameters": given_out(found.best)},
+        "set_to_zero": list(result.best.fitted.zeroed),
+        "model_file": {"rms": fit.rms, "parameters": given_out(result.best)},
         "parameters": {
             name: {"value": e.value, "stderr": e.stderr and wider * e.stderr}
             for name, e in fit.estimates.items()
         },
         "runs": {
             name: [{"value": value, "stderr": error} for value, error in pairs]
-            for name, pairs in found.runs.coefficients.items()
+            for name, pairs in result.runs.coefficients.items()
         },
-        "ranking": ranking(found),
+        "ranking": ranking(result),
         "not_computed": unknown,
-        "attempts": [dataclasses.asdict(attempt) for attempt in found.attempts],
-        "findings": [one.text for _, one in found.data.experiment.findings_of(found.data.runs)],
+        "attempts": [dataclasses.asdict(attempt) for attempt in result.attempts],
+        "findings": [one.text for _, one in result.data.experiment.findings_of(result.data.runs)],
     }

@@ -90,17 +90,17 @@ def compare_alternatives(state: State, best: FittedModel, candidate: Candidate) 
     gain = (reduced.chi2 - best.chi2) / level
     scores = state.scores(reduced)
     places = scores.best()
-    own = next((k for k in places if scores.name(k) == candidate.name), None)
-    if own is None:
+    place = next((k for k in places if scores.name(k) == candidate.name), None)
+    if place is None:
         return Identifiability(candidate, gain, state.closed(reduced, best), ())
     fits = dict(fit_alternatives(state, best, candidate, reduced))
     alternatives = []
     for k in places:
         score, fit = scores.scores[k], fits.get(k)
-        if k == own or score.gain <= 0:
+        if k == place or score.gain <= 0:
             continue
         reached = score.gain / level
-        if scores.same(own, k):
+        if scores.same(place, k):
             reached = gain
         elif fit is not None:
             fit = state.converge(fit)
@@ -108,7 +108,9 @@ def compare_alternatives(state: State, best: FittedModel, candidate: Candidate) 
         more = score.candidate.count > candidate.count
         chosen = score.candidate.choice_gain - candidate.choice_gain
         behind = gain - reached + chosen
-        contains = more and scores.likeness(own, k) > CONTAINS and behind > -state.thresholds.alike
+        contains = (
+            more and scores.likeness(place, k) > CONTAINS and behind > -state.thresholds.alike
+        )
         alike = behind < state.thresholds.alike
         if fit is not None and not alike and not candidate.once:
             # The accepted effect must be better without any one run, or any third of a single run.
@@ -239,7 +241,7 @@ def decide_verdict(state: State, best: ScoredModel, runs: RunByRun, chance: floa
         verdict = "unknown" if lacks else "none"
     elif lacks:
         verdict = "partial" if closed >= limits.closes else "unknown"
-    elif any(len(each.equivalent) > 1 for each in identified):
+    elif any(len(effect.equivalent) > 1 for effect in identified):
         verdict = "ambiguous"
     else:
         verdict = "named"
@@ -262,12 +264,12 @@ def decide_verdict(state: State, best: ScoredModel, runs: RunByRun, chance: floa
 def features(chance: float, gains: Sequence[float]) -> list[tuple[float, ...]]:
     """Return the regressors of each name's probability in :func:`probabilities`."""
     low, high = GAINS
-    kept = [min(max(gain, low), high) for gain in gains]
+    clipped = [min(max(gain, low), high) for gain in gains]
     left = math.log10(max(chance, LEAST_CHANCE))
-    most = max(kept, default=low)
+    most = max(clipped, default=low)
     return [
-        (1.0, left, len(kept) - 1.0, math.log10(gain / most), math.log10(most / 100))
-        for gain in kept
+        (1.0, left, len(clipped) - 1.0, math.log10(gain / most), math.log10(most / 100))
+        for gain in clipped
     ]
 
 

@@ -166,15 +166,15 @@ def identify(  # noqa: PLR0913 (each is asked for by name)
         raise InputError(f"effects must be left out without a fit of every sample, got {got}")
     if run.peaks_only:
         peaks = Peaks.of(run.time[run.trusted], run.theta[run.trusted])
-        found = identify_peaks(peaks, names)
-        table = table_of_run(run, peaks, found)
-        return IdentificationReport(experiment, run, peaks, found, None, table)
+        results = identify_peaks(peaks, names)
+        table = table_of_run(run, peaks, results)
+        return IdentificationReport(experiment, run, peaks, results, None, table)
     others = [name for name in names if name != BEST]
     steps, before = len(names) + 2, len(names) - len(others) + 1
     report = progress or (lambda _done, _total: None)
-    sigma, joint, found = None, None, {}
+    sigma, joint, results = None, None, {}
     if BEST in names:
-        joint, found[BEST] = _best(experiment, run, start, effects)
+        joint, results[BEST] = _best(experiment, run, start, effects)
         if joint is not None:
             sigma = joint.readings[0].sigma
     report(before - 1, steps)
@@ -189,12 +189,12 @@ def identify(  # noqa: PLR0913 (each is asked for by name)
         peaks=peaks,
         progress=lambda done, _total: report(before + done, steps),
     )
-    found |= {name: one.with_clock(run.clock_stderr) for name, one in rest.items()}
-    table = table_of_run(run, peaks, found)
+    results |= {name: one.with_clock(run.clock_stderr) for name, one in rest.items()}
+    table = table_of_run(run, peaks, results)
     drag = None if joint is None or start is not None or effects else _with_drag(joint)
     report(steps, steps)
     asked = tuple(effect if isinstance(effect, str) else effect.name for effect in effects)
-    return IdentificationReport(experiment, run, peaks, found, joint, table, drag, asked)
+    return IdentificationReport(experiment, run, peaks, results, joint, table, drag, asked)
 
 
 def _with_drag(joint: JointFit) -> JointFit | None:
@@ -206,13 +206,13 @@ def _with_drag(joint: JointFit) -> JointFit | None:
     if joint.fit.rms < MISSES * noise:
         return None
     try:
-        found = physical(fit_together(joint.runs, start=joint.fit.model, effects=[DRAG]))
+        with_drag = physical(fit_together(joint.runs, start=joint.fit.model, effects=[DRAG]))
     except FitDiverged:
         return None
-    drag = next(effect for effect in found.fit.model.effects if effect.name == DRAG)
+    drag = next(effect for effect in with_drag.fit.model.effects if effect.name == DRAG)
     opposes = min(drag.values) > 0
-    gap, left = (one.fit.rms**2 - noise**2 for one in (joint, found))
-    return found if opposes and left < CLOSED * gap else None
+    gap, left = (one.fit.rms**2 - noise**2 for one in (joint, with_drag))
+    return with_drag if opposes and left < CLOSED * gap else None
 
 
 def _best(

@@ -130,8 +130,8 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
     }
     begun = None if windows is None else bare_windows(windows, units)
     with core_errors(FitDiverged):
-        found = _core.fit_runs(given, unknown.start, choices, begun)
-    return _result(found, model, unknown, chosen, max(run.clock_stderr for run in runs))
+        fit = _core.fit_runs(given, unknown.start, choices, begun)
+    return _result(fit, model, unknown, chosen, max(run.clock_stderr for run in runs))
 
 
 def prepared(
@@ -147,24 +147,24 @@ def prepared(
 
 
 def _result(
-    found: _core.Fit, model: Rig, unknown: Conversion, chosen: Sequence[int], clock: float
+    fit: _core.Fit, model: Rig, unknown: Conversion, chosen: Sequence[int], clock: float
 ) -> TrajectoryFit:
-    units, bare = unknown.units, found.values
+    units, bare = unknown.units, fit.values
     values = unknown.given(bare)
     # An error of the clock's rate changes all parameters together by their power of time.
     by_clock = clock * unknown.powers(bare) * values
-    covariance = unknown.covariance(found.covariance, bare)
-    covariance += np.outer(by_clock, by_clock) / found.widening
+    covariance = unknown.covariance(fit.covariance, bare)
+    covariance += np.outer(by_clock, by_clock) / fit.widening
     errors = [math.sqrt(variance) for variance in np.diag(covariance)]
     # Sizes with a free exponent have no profile: their intervals follow from the covariance.
-    wide = math.sqrt(LEVEL * found.widening)
+    wide = math.sqrt(LEVEL * fit.widening)
     intervals = {
         k: interval(float(values[k]), wide * errors[k], mixed=True)
         for k in unknown.mixed
         if k in chosen
     }
     profiled = [k for k in chosen if k not in unknown.mixed]
-    for k, pair in zip(profiled, found.intervals, strict=True):
+    for k, pair in zip(profiled, fit.intervals, strict=True):
         both = [float(unknown.given([*bare[:k], end, *bare[k + 1 :]])[k]) for end in pair]
         # The unit of a bias may be negative; an end that is not found is NaN.
         low = next((end for end in both if end < values[k]), math.nan)
@@ -181,7 +181,7 @@ def _result(
     except InputError as error:
         raise FitDiverged(f"the fit ends at values that are invalid in a model: {error}") from None
     curves, residuals, squares = [], [], 0.0
-    for curve in found.runs:
+    for curve in fit.runs:
         curves.append(np.stack([curve.theta, units.given(curve.velocity, 1)]))
         residuals.append(curve.residual)
         squares += float(np.nansum(residuals[-1] ** 2))
@@ -190,30 +190,30 @@ def _result(
         ends=ends,
         names=tuple(estimates),
         covariance=covariance,
-        chi2=found.chi2,
-        samples=found.samples,
-        degrees=found.degrees,
-        rms=math.sqrt(squares / max(found.samples, 1)),
+        chi2=fit.chi2,
+        samples=fit.samples,
+        degrees=fit.degrees,
+        rms=math.sqrt(squares / max(fit.samples, 1)),
         model=found_model,
         curves=tuple(curves),
         residuals=tuple(residuals),
-        white=tuple(curve.white for curve in found.runs),
+        white=tuple(curve.white for curve in fit.runs),
         windows=tuple(
-            (r, a, b, theta, float(units.given(v, 1))) for r, a, b, theta, v in found.windows
+            (r, a, b, theta, float(units.given(v, 1))) for r, a, b, theta, v in fit.windows
         ),
-        steps=found.steps,
-        converged=found.converged,
-        given_up=found.given_up,
-        widening=found.widening,
+        steps=fit.steps,
+        converged=fit.converged,
+        given_up=fit.given_up,
+        widening=fit.widening,
         mixed=tuple(unknown.names[k] for k in unknown.mixed),
     )
 
 
 def _found_model(model: Rig, estimates: Mapping[str, Estimate]) -> Rig:
-    own = {n: e.value for n, e in estimates.items() if n in PLACES}
-    own |= {n: max(own[n], 0.0) for n in OPPOSING if n in own}
+    values = {n: e.value for n, e in estimates.items() if n in PLACES}
+    values |= {n: max(values[n], 0.0) for n in OPPOSING if n in values}
     if model.p == 0:
-        own = {n: value for n, value in own.items() if n not in PER_RUN}
+        values = {n: value for n, value in values.items() if n not in PER_RUN}
     effects = []
     for effect in model.effects:
         names = {p: f"{effect.name}.{p}" for p in effect.parameters}
@@ -222,7 +222,7 @@ def _found_model(model: Rig, estimates: Mapping[str, Estimate]) -> Rig:
         ci95 = {p: ci for p, ci in bounds.items() if ci is not None}
         parameters = dict(effect.parameters) | known
         effects.append(dataclasses.replace(effect, parameters=parameters, ci95=ci95))
-    return dataclasses.replace(model, **own, effects=tuple(effects), notes={})
+    return dataclasses.replace(model, **values, effects=tuple(effects), notes={})
 
 
 MISSED: Final = 0.5

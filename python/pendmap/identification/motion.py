@@ -41,11 +41,11 @@ class Motion:
 
     def without(self, effect: str) -> Motion:
         """Return the motion of the pendulum without one of its effects."""
-        own = own_name(effect)
-        if own is not None:
-            return dataclasses.replace(self, own={**self.own, own: 0.0})
-        kept = tuple(e for e in self.model.effects if e.name != effect)
-        return dataclasses.replace(self, model=dataclasses.replace(self.model, effects=kept))
+        parameter = own_name(effect)
+        if parameter is not None:
+            return dataclasses.replace(self, own={**self.own, parameter: 0.0})
+        effects = tuple(e for e in self.model.effects if e.name != effect)
+        return dataclasses.replace(self, model=dataclasses.replace(self.model, effects=effects))
 
 
 def run_forward(
@@ -77,12 +77,12 @@ def _fit_motion(
         (k, 0, run.time.size, *state)
         for k, (run, state) in enumerate(zip(whole, states, strict=True))
     ]
-    own = motion.own
+    values = motion.own
     return fit_runs(
         whole,
         motion.model,
-        tuple(own),
-        start=own,
+        tuple(values),
+        start=values,
         windows=windows,
         profiled=(),
         hold=True,

@@ -79,13 +79,15 @@ def free_quantities(
         wanted += [("phi", of_run[k], [k]) for k in unknown]
     quantities = []
     for name, suffix, where in wanted:
-        found = {k: each for k in where if (each := _found_in(rigs[k], name, names)) is not None}
-        if not found:
+        entries = {
+            k: entry for k in where if (entry := _found_in(rigs[k], name, names)) is not None
+        }
+        if not entries:
             known = f"{', '.join(PLACES)} and effect.parameter of the model's effects"
             raise InputError(f"free must be among {known}, got {short_repr(name)}")
-        _, power, less, value = next(iter(found.values()))
+        _, power, less, value = next(iter(entries.values()))
         begin = start.get(name + suffix, start.get(name, value))
-        places = [(k, place) for k, (place, *_) in found.items()]
+        places = [(k, place) for k, (place, *_) in entries.items()]
         quantities.append(Quantity(name + suffix, power, places, begin, less=less))
     for k, run in enumerate(runs):
         if run.rod_sensor is None:
@@ -103,14 +105,14 @@ def _found_in(
     """Return a parameter's name in the core, power of ``w0``, exponent subtracted and value."""
     if name in PLACES:
         return *PLACES[name], None, float(getattr(rig, name))
-    own, _, parameter = name.rpartition(".")
-    effects = (e for e in rig.effects if e.name == own and parameter in e.parameters)
+    effect_name, _, parameter = name.rpartition(".")
+    effects = (e for e in rig.effects if e.name == effect_name and parameter in e.parameters)
     effect = next(effects, None)
     if effect is None:
         return None
     entry = effect.definition[parameter]
     power, less = float(entry.power_of_w0), entry.power_of_w0_less
-    exponent = None if less is None else f"{own}.{less}"
+    exponent = None if less is None else f"{effect_name}.{less}"
     if less is not None and exponent not in free:
         power, exponent = power - effect.parameters[less], None
     return name, power, exponent, effect.parameters[parameter]
@@ -158,10 +160,10 @@ class Conversion:
         for k, q in enumerate(self.quantities):
             if q.name == "w0":
                 slopes[k] = self.units.w0**2 / (2 * given[k])
-        found = np.diag(slopes)
+        matrix = np.diag(slopes)
         for size, exponent in self._exponents.items():
-            found[size, exponent] = -math.log(self.units.w0) * given[size]
-        return found
+            matrix[size, exponent] = -math.log(self.units.w0) * given[size]
+        return matrix
 
     def columns(self, bare: Floats, values: ArrayLike) -> Floats:
         """Return derivatives by the parameters in SI, shape (n, k), from those in core units."""
@@ -174,11 +176,11 @@ class Conversion:
         """
         slopes = self.jacobian(values)
         known = np.where(np.isfinite(bare), bare, 0.0)
-        found = slopes @ known @ slopes.T
+        covariance = slopes @ known @ slopes.T
         unseen = ~np.isfinite(np.diag(bare))
         through = (slopes[:, unseen] != 0).any(axis=1)
-        found[through, through] = np.inf
-        return np.asarray(found, np.float64)
+        covariance[through, through] = np.inf
+        return np.asarray(covariance, np.float64)
 
     @property
     def mixed(self) -> tuple[int, ...]:

@@ -96,10 +96,10 @@ class Finder:
             fit = fit_around(
                 self.time, self.theta, time, half, (0, 1, 2, 3, 4), sigma=self.sigma, begin=begin
             )
-            found = None if fit is None else fit.turn()
-            if found is None:
+            instant = None if fit is None else fit.turn()
+            if instant is None:
                 return None
-            near, time = time, found
+            near, time = time, instant
             if abs(time - near) < 0.1 * self.step:
                 break
         if fit is None:
@@ -142,7 +142,7 @@ class Finder:
 
     def crossings(self, index: NDArray[np.int64]) -> tuple[Floats, Floats, NDArray[np.int64]]:
         """Return times of zero crossings between two peaks, their errors and half cycles."""
-        found = []
+        rows = []
         for (before, after), k in zip(itertools.pairwise(self.ends), index[:-1], strict=True):
             if after.kind == "stop" or before.angle * after.angle >= 0:
                 continue
@@ -159,6 +159,6 @@ class Finder:
             if fit is None or fit.zero() is None:
                 continue
             (_, gain), (speed, _) = fit.at(time), fit.at(time, 1)
-            found.append((time, gain * self._effective(fit) / abs(speed), k))
-        columns = np.array(found, float).reshape(-1, 3).T
+            rows.append((time, gain * self._effective(fit) / abs(speed), k))
+        columns = np.array(rows, float).reshape(-1, 3).T
         return columns[0], columns[1], columns[2].astype(np.int64)

@@ -198,8 +198,8 @@ def find_peaks(
     columns = np.array([(e.time, e.angle, e.stderr_time, e.stderr_angle) for e in ends])
     instant, angle, stderr_time, stderr_angle = columns.reshape(-1, 4).T.copy()
     kind, crossings = tuple(e.kind for e in ends), finder.crossings(index)
-    found = Peaks(instant, angle, stderr_time, stderr_angle, index, kind, *crossings, sigma=noise)
-    return found.later(first)
+    peaks = Peaks(instant, angle, stderr_time, stderr_angle, index, kind, *crossings, sigma=noise)
+    return peaks.later(first)
 
 
 def _finder(

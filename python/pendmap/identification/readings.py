@@ -87,8 +87,8 @@ def reading_of(
     coarse = sigma < DITHERED * count
     if law is None:
         return Reading(sigma, count, np.full(theta.shape, sigma), doubt, coarse)
-    each = np.maximum(law.sigma(time, theta), least)
-    return Reading(sigma, count, each, doubt, coarse, law, law.shift(time, theta))
+    sigmas = np.maximum(law.sigma(time, theta), least)
+    return Reading(sigma, count, sigmas, doubt, coarse, law, law.shift(time, theta))
 
 
 def as_fit_run(run: Run, reading: Reading) -> FitRun:
@@ -128,12 +128,12 @@ def reading_of_run(run: Run) -> Reading:
     time, sensor = from_first(run.time)[0], run.rod_sensor
     if sensor is None:
         return reading_of(time, run.theta, trusted=run.trusted, count=run.count_rad)
-    found = reading_of(time, as_angles(run), trusted=run.trusted)
-    law = found.law
+    reading = reading_of(time, as_angles(run), trusted=run.trusted)
+    law = reading.law
     if law is not None and run.gyroscope is not None:
         # The error of a rate by jitter is proportional to the acceleration.
         law = dataclasses.replace(law, grows_with="acceleration")
-    return dataclasses.replace(found, law=law, gain=abs(sensor.gain), unit=sensor.unit)
+    return dataclasses.replace(reading, law=law, gain=abs(sensor.gain), unit=sensor.unit)
 
 
 def _rod_sensor(run: Run) -> RodSensor | None:

@@ -127,7 +127,7 @@ class IdentificationReport(FitResult):
         first = next(iter(self.methods.values()))
         if not first.sound and (self.asked or not first.converged):
             return None
-        return next((found for found in self.methods.values() if found.sound), None)
+        return next((result for result in self.methods.values() if result.sound), None)
 
     @property
     def best(self) -> Identification:
@@ -171,27 +171,27 @@ class IdentificationReport(FitResult):
         if best.covariance is not None:
             names, matrix = best.covariance
             # Bias and tilt of a sensor do not belong to the pendulum.
-            own = {name: name for name in names if name.partition("[")[0] not in SENSOR}
-            if "offset" in own:
-                own["offset"] = f"{OFFSET}.d"
-            kept = [names.index(name) for name in own]
-            bounds = {name: e.ci95 for name, e in best.estimates.items() if name in own}
+            written = {name: name for name in names if name.partition("[")[0] not in SENSOR}
+            if "offset" in written:
+                written["offset"] = f"{OFFSET}.d"
+            places = [names.index(name) for name in written]
+            bounds = {name: e.ci95 for name, e in best.estimates.items() if name in written}
             notes["covariance"] = {
-                "names": [*own.values()],
-                "matrix": matrix[np.ix_(kept, kept)].tolist(),
-                "ci95": {own[n]: list(ci95) for n, ci95 in bounds.items() if ci95 is not None},
+                "names": [*written.values()],
+                "matrix": matrix[np.ix_(places, places)].tolist(),
+                "ci95": {written[n]: list(ci95) for n, ci95 in bounds.items() if ci95 is not None},
             }
-        found = best.model or dataclasses.replace(best.rig, gravity=self.experiment.gravity)
-        return dataclasses.replace(found, notes=notes)
+        model = best.model or dataclasses.replace(best.rig, gravity=self.experiment.gravity)
+        return dataclasses.replace(model, notes=notes)
 
 
 def left_out(experiment: Experiment, read: Sequence[Run]) -> str:
     """Return the text on the runs that were used and not used; empty if all were used."""
     reasons: Counter[tuple[str, str]] = Counter()  # words before and after "run"
     # If held-out runs are used too, being held out is no reason.
-    held_too = any(each.hold_out for each in read)
+    held_too = any(used_run.hold_out for used_run in read)
     for run in experiment.runs:
-        if any(run is each for each in read):
+        if any(run is used_run for used_run in read):
             continue
         if run.copied:
             why = "", " that copies another"
@@ -222,7 +222,7 @@ def as_json(report: IdentificationReport) -> dict[str, Any]:
         "noise": report.peaks.sigma,
         "best": None if best is None else best.method,
         "doubts": foremost(report),
-        "methods": {name: _method(found) for name, found in report.methods.items()},
+        "methods": {name: _method(result) for name, result in report.methods.items()},
         "table1": [
             {"what": r.what, "asked": r.asked, "measured": r.measured, "errors_percent": r.errors}
             for r in report.table.rows
@@ -236,7 +236,7 @@ def as_json(report: IdentificationReport) -> dict[str, Any]:
             "rms": report.with_drag.fit.rms,
             "parameters": {n: e.value for n, e in report.with_drag.fit.estimates.items()},
         },
-        "findings": [found.text for _, found in report.experiment.findings_of(report.runs)],
+        "findings": [finding.text for _, finding in report.experiment.findings_of(report.runs)],
     }
 
 
@@ -261,17 +261,17 @@ def _runs(report: IdentificationReport) -> list[dict[str, Any]]:
     return entries
 
 
-def _method(found: Identification) -> dict[str, Any]:
-    known = {**found.estimates, **found.derived}
+def _method(result: Identification) -> dict[str, Any]:
+    known = {**result.estimates, **result.derived}
     names = list(dict.fromkeys([*COLUMNS, *known]))
     entry: dict[str, Any] = {name: known[name].value if name in known else None for name in names}
     return entry | {
         "stderr": {name: known[name].stderr if name in known else None for name in names},
         "ci95": {name: known[name].ci95 if name in known else None for name in names},
-        "warnings": list(found.warnings),
-        "used": found.used,
-        "applicable": found.applicable,
-        "misfit": found.misfit,
+        "warnings": list(result.warnings),
+        "used": result.used,
+        "applicable": result.applicable,
+        "misfit": result.misfit,
     }
 
 
@@ -301,11 +301,11 @@ def as_text(report: IdentificationReport) -> Iterator[str]:
     yield from _drag(report)
     if report.table.left_out:
         yield f"{report.run.name}: {report.table.left_out}"
-    said = left_out(report.experiment, report.runs)
-    if said:
-        yield said
-    for name, found in report.methods.items():
-        for warning in found.warnings:
+    runs_text = left_out(report.experiment, report.runs)
+    if runs_text:
+        yield runs_text
+    for name, result in report.methods.items():
+        for warning in result.warnings:
             yield f"{name}: {warning}"
         if name in report.table.lost:
             yield f"{name}: not simulated from the first peak: {report.table.lost[name]}"
@@ -326,9 +326,9 @@ def in_short(report: IdentificationReport) -> Iterator[str]:
             if name in known
         )
         yield f"{best.method}: {best.used}"
-    said = left_out(report.experiment, report.runs)
-    if said:
-        yield said
+    runs_text = left_out(report.experiment, report.runs)
+    if runs_text:
+        yield runs_text
     yield from finding_lines(report.experiment, *report.runs, changes=True)
     yield from (f"Warning: {text}" for text in (() if best is None else best.warnings))
     yield from _drag(report)
@@ -346,10 +346,10 @@ def methods_table(report: IdentificationReport) -> tuple[list[str], list[list[st
     extra = [] if best is None else [n for n in best.estimates if n not in COLUMNS]
     names = [*COLUMNS, *extra]
     rows = []
-    for method, found in report.methods.items():
-        known = {**found.estimates, **found.derived}
+    for method, result in report.methods.items():
+        known = {**result.estimates, **result.derived}
         shown = [estimate_text(known[name]) if name in known else "" for name in names]
-        if not found.applicable:
+        if not result.applicable:
             shown = ["not applicable", *[""] * (len(names) - 1)]
         rows.append([method, *shown])
     return ["method", *COLUMNS.values(), *extra], rows
@@ -359,8 +359,8 @@ def table1_table(report: IdentificationReport) -> tuple[list[str], list[list[str
     """Return header and rows of table 1: percent errors of each method's simulation."""
     rows = []
     for name, errors in report.table.errors.items():
-        each = [percent(row.errors[name]) or "at rest" for row in report.table.rows]
-        rows.append([name, *each, percent(errors.period_rms), percent(errors.peak_rms)])
+        cells = [percent(row.errors[name]) or "at rest" for row in report.table.rows]
+        rows.append([name, *cells, percent(errors.period_rms), percent(errors.peak_rms)])
     units = {"period": "s", "peak": "rad"}
     measured = [f"{r.what} {r.measured:.4g} {units[r.what]}" for r in report.table.rows]
     return ["error of the simulated", *measured, "periods, rms", "peaks, rms"], rows

@@ -121,8 +121,8 @@ class Parameters(Saved):
 
     def unit(self, name: str) -> str:
         """Return the unit of a parameter; empty for a pure number."""
-        own, _, run = name.partition("[")
-        if own == "bias" and self.sensors:
+        parameter, _, run = name.partition("[")
+        if parameter == "bias" and self.sensors:
             return self.sensors[int(run[:-1] or 0)].replace("s2", "s²")
         return unit_of(name, self.definition)
 
@@ -220,16 +220,16 @@ class FitResult(Parameters):
         InputError is raised without a fit of whole records.
         """
         fit, fitted, runs = self.followed()
-        found = {}
+        residuals = {}
         for given, run, values in zip(fitted, runs, fit.residuals, strict=True):
             time = given.time + _begin(given, run)
-            found[run.name] = xr.DataArray(
+            residuals[run.name] = xr.DataArray(
                 np.where(given.counted, values, np.nan),
                 {"time": ("time", time, {"units": "s", "long_name": "time of the record"})},
                 name="residual",
                 attrs={"units": "rad", "long_name": "reading less fitted model"},
             )
-        return found
+        return residuals
 
     def predict(self, t: ArrayLike, run: str | None = None) -> Floats:
         """Return the angle of the fitted model in a run: its motion, without the sensor's errors.
@@ -257,7 +257,7 @@ class FitResult(Parameters):
             If the model diverges after the record.
         """
         fit, fitted, runs = self.followed()
-        names = [each.name for each in runs]
+        names = [fitted_run.name for fitted_run in runs]
         if run is not None and run not in names:
             raise InputError(f"run must be one of {', '.join(names)}, got {short_repr(run)}")
         place = 0 if run is None else names.index(run)
@@ -271,16 +271,16 @@ class FitResult(Parameters):
         if not np.isfinite(times).all() or (times.size and times.min() < firsts[0]):
             least = moment(begin + float(firsts[0]))
             raise InputError(f"t must be finite times from {least} s on, got {short_repr(t)}")
-        found, owner = np.empty(times.shape), np.searchsorted(firsts, times, side="right") - 1
+        angle, owner = np.empty(times.shape), np.searchsorted(firsts, times, side="right") - 1
         given = dataclasses.replace(given, sigma=EXACT, trusted=None, rod_sensor=None, count=None)
         given = dataclasses.replace(given, drive=fit.drive_of(given, place))
         for k in np.unique(owner):
-            (first, state), own = windows[k], owner == k
-            grid = np.union1d(times[own], first + STEP * np.arange(3))
+            (first, state), in_window = windows[k], owner == k
+            grid = np.union1d(times[in_window], first + STEP * np.arange(3))
             ahead = dataclasses.replace(given, time=grid, theta=np.zeros(grid.size))
             ((_, (theta, _)),) = run_forward(Motion.of(fit), [ahead], [state])
-            found[own] = theta[np.searchsorted(grid, times[own])]
-        return found
+            angle[in_window] = theta[np.searchsorted(grid, times[in_window])]
+        return angle
 
 
 def _begin(given: FitRun, run: Run) -> float:

@@ -69,9 +69,9 @@ class WindowSlopes:
         basis = _basis(self.states[counted])
 
         def free(values: Floats) -> Floats:
-            kept = values[counted]
-            rest = kept - basis @ (basis.T @ kept)
-            followed = lengths(rest) < FOLLOWED * lengths(kept)
+            rows = values[counted]
+            rest = rows - basis @ (basis.T @ rows)
+            followed = lengths(rest) < FOLLOWED * lengths(rows)
             return np.asarray(np.where(followed, 0.0, rest), np.float64)
 
         return free(self.columns), free(further), free(self.residual)
@@ -89,15 +89,15 @@ def window_slopes(
     unknown, given = prepared(runs, model, [*base, *candidates], start)
     begin, windows = unknown.start, bare_windows(fit.windows, unknown.units)
     with core_errors(FitDiverged):
-        found = _core.fit_rows(given, begin, tolerance_of(runs), windows)
-    ends = np.cumsum([len(one.rows) for one in found])
+        slopes = _core.fit_rows(given, begin, tolerance_of(runs), windows)
+    ends = np.cumsum([len(one.rows) for one in slopes])
     bare = np.zeros((int(ends[-1]), len(begin)))
-    for one, end in zip(found, ends, strict=True):
+    for one, end in zip(slopes, ends, strict=True):
         bare[end - len(one.rows) : end, one.free] = one.rows[:, :-STATE]
     columns = np.split(unknown.columns(bare, [value for _, value in begin]), ends[:-1])
     return unknown.names, [
-        WindowSlopes(*window[:2], own, one.rows[:, -STATE:], one.residuals, one.weights)
-        for one, window, own in zip(found, fit.windows, columns, strict=True)
+        WindowSlopes(*window[:2], block, one.rows[:, -STATE:], one.residuals, one.weights)
+        for one, window, block in zip(slopes, fit.windows, columns, strict=True)
     ]
 
 
@@ -115,7 +115,9 @@ def freed_together(names: tuple[str, ...], windows: Sequence[WindowSlopes]) -> S
     """Return the derivatives of all windows, orthogonal to the initial states."""
     parts = [window.freed(window.columns[:, :0]) for window in windows]
     columns, _, residual = (np.concatenate(part) for part in zip(*parts, strict=True))
-    run = np.repeat([window.run for window in windows], [len(own) for _, _, own in parts])
+    run = np.repeat(
+        [window.run for window in windows], [len(residuals) for _, _, residuals in parts]
+    )
     return Sensitivities(names, columns, residual, run)
 
 

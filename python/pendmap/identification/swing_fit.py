@@ -102,8 +102,8 @@ def _prior(
         w, loss = np.sqrt(w2), 0.0
         if block.stop - block.start > _LOSS:
             here = np.maximum(np.abs(state[block]), 1e-12)
-            each = 2 * np.log(here[:-2] / here[2:]) / (instant[block][2:] - instant[block][:-2])
-            loss = max(float(np.median(each)), 0.0)
+            losses = 2 * np.log(here[:-2] / here[2:]) / (instant[block][2:] - instant[block][:-2])
+            loss = max(float(np.median(losses)), 0.0)
         centre[block, 1] = loss
         spread = 0.01 * w + loss
         wide[block] = 0.1 * w2, spread, spread * w * size, 0.2 * size
@@ -115,7 +115,7 @@ def _rows(
 ) -> tuple[Floats, Floats, Floats]:
     """Return derivatives by instant and state (W, M, 2), by the form (W, M, 4), and residuals."""
     count = instant.size
-    each = np.stack(
+    steps = np.stack(
         (
             1e-5 * np.maximum(np.abs(state), 1e-3),
             1e-5 * form[:, 0],
@@ -126,8 +126,8 @@ def _rows(
     )
     states, forms = [state], [form]
     for k in range(1 + FORM):
-        states.append(state + each[0] if k == 0 else state)
-        forms.append(form + (np.eye(FORM)[k - 1] * each[k][:, None] if k else 0.0))
+        states.append(state + steps[0] if k == 0 else state)
+        forms.append(form + (np.eye(FORM)[k - 1] * steps[k][:, None] if k else 0.0))
     fields = {f.name: getattr(windows, f.name) for f in dataclasses.fields(windows)}
     copies = {name: np.concatenate([part] * (2 + FORM)) for name, part in fields.items()}
     angle, speed = curves(
@@ -137,7 +137,7 @@ def _rows(
         np.concatenate(forms),
     )
     angle = angle.reshape(2 + FORM, count, -1)
-    change = np.stack([(angle[k + 1] - angle[0]) / each[k][:, None] for k in range(1 + FORM)], -1)
+    change = np.stack([(angle[k + 1] - angle[0]) / steps[k][:, None] for k in range(1 + FORM)], -1)
     used = windows.used
     local = np.stack((-speed[:count], change[..., 0]), -1) * used[..., None]
     shared = change[..., 1:] * used[..., None]
@@ -197,13 +197,13 @@ def _scales(residual: Floats, used: Mask, blocks: list[slice]) -> Floats:
 def _errors(  # noqa: PLR0913, PLR0917 (all of a fit)
     rows: tuple[Floats, Floats, Floats],
     blocks: list[slice],
-    found: tuple[Floats, Floats, Floats],
+    solution: tuple[Floats, Floats, Floats],
     used: Mask,
     prior: tuple[Floats, Floats] | None,
     sigma: float | None,
     known: SwingFit | None,
 ) -> SwingFit:
-    instant, state, form = found
+    instant, state, form = solution
     points = used.sum(axis=1)
     square = np.sum(rows[2] ** 2, axis=1)
     sizes = np.array([block.stop - block.start for block in blocks])
@@ -221,8 +221,8 @@ def _errors(  # noqa: PLR0913, PLR0917 (all of a fit)
             sigma = float(np.sqrt(np.sum((freedom * noise**2)[even]) / freedom[even].sum()))
         sigma = max(sigma, 1e-15)
         doubt = noise / sigma > 1 + _DOUBT * np.sqrt(0.5 / freedom)
-        each = np.where(doubt, noise / sigma, 1.0)
-        factor = np.repeat(each, sizes)
+        factors = np.where(doubt, noise / sigma, 1.0)
+        factor = np.repeat(factors, sizes)
     held = None if prior is None else (*prior, form, np.full(points.size, sigma))
     _, (inverse, follows, form_inverse) = _step(rows, blocks, held)
     scale = (sigma * factor) ** 2

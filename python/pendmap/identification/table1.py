@@ -127,19 +127,19 @@ def simulated_peaks(rig: Rig, start: State, until: float) -> tuple[Floats, Float
 
 
 def peak_errors(
-    found: Identification, peaks: Peaks, start: State, *, offset: float | None = None
+    identification: Identification, peaks: Peaks, start: State, *, offset: float | None = None
 ) -> PeakErrors:
     """Return the errors of a model's simulation from ``start``, the first of ``peaks``.
 
     The identified zero error is subtracted from the recorded ``start``. ``offset`` is the zero
     error of ``peaks``, rad, if it differs.
     """
-    shown = found.zero if offset is None else offset
+    shown = identification.zero if offset is None else offset
     turned = peaks.turned
-    origin = dataclasses.replace(start, theta=start.theta - found.zero)
+    origin = dataclasses.replace(start, theta=start.theta - identification.zero)
     span = float(turned.time[-1]) - start.time
-    times, angles = simulated_peaks(found.rig, origin, start.time + 1.2 * span + 5.0)
-    return errors_of(found.method, peaks, times, angles + shown)
+    times, angles = simulated_peaks(identification.rig, origin, start.time + 1.2 * span + 5.0)
+    return errors_of(identification.method, peaks, times, angles + shown)
 
 
 def errors_of(method: str, peaks: Peaks, times: Floats, angles: Floats) -> PeakErrors:
@@ -196,50 +196,54 @@ def table1(  # noqa: PLR0913 (record, models, rows)
     ----------
     Horton, Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A, table 1 and figure 7.
     """
-    found = find_peaks(time, theta, sigma=sigma, trusted=trusted)
-    return table_of(found, identifications, periods=periods, peaks=peaks)
+    record_peaks = find_peaks(time, theta, sigma=sigma, trusted=trusted)
+    return table_of(record_peaks, identifications, periods=periods, peaks=peaks)
 
 
 def table_of(
-    found: Peaks,
+    record_peaks: Peaks,
     identifications: Mapping[str, Identification],
     *,
     periods: Sequence[float] = PERIODS,
     peaks: Sequence[float] = PEAKS,
 ) -> Table1:
     """Return table 1 of given peaks; see :func:`table1`."""
-    if len(found.turned) < 3:  # noqa: PLR2004 (one full cycle)
+    if len(record_peaks.turned) < 3:  # noqa: PLR2004 (one full cycle)
         return Table1((), {})
-    start = first_state(found)
+    start = first_state(record_peaks)
     errors, lost = {}, {}
-    for name, each in identifications.items():
-        if not each.applicable:
+    for name, identification in identifications.items():
+        if not identification.applicable:
             continue
         try:
-            errors[name] = peak_errors(each, found, start)
+            errors[name] = peak_errors(identification, record_peaks, start)
         except InputError as error:
             lost[name] = str(error)
     # One measured value may be nearest to several values of the paper.
-    told: dict[tuple[str, float], Row] = {}
+    rows: dict[tuple[str, float], Row] = {}
     for what, asked in [*(("period", t) for t in periods), *(("peak", a) for a in peaks)]:
         if row := _row(what, asked, errors):
-            told.setdefault((what, row.measured), row)
-    return Table1(tuple(told.values()), errors, lost=lost)
+            rows.setdefault((what, row.measured), row)
+    return Table1(tuple(rows.values()), errors, lost=lost)
 
 
-def table_of_run(run: Run, found: Peaks, identifications: Mapping[str, Identification]) -> Table1:
+def table_of_run(run: Run, peaks: Peaks, identifications: Mapping[str, Identification]) -> Table1:
     """Return table 1 of a run; empty if its angle was computed from an acceleration."""
     if run.accelerometer is not None:
         return Table1((), {}, ROUGH)
-    return table_of(found, identifications)
+    return table_of(peaks, identifications)
 
 
 def _row(what: str, asked: float, errors: Mapping[str, PeakErrors]) -> Row | None:
     """Return the row of the measured value nearest to ``asked``; None if there is none."""
     column, measured = {}, math.nan
-    for name, each in errors.items():
+    for name, method_errors in errors.items():
         peak = what == "peak"
-        there, wrong = (each.peak, each.peak_error) if peak else (each.period, each.period_error)
+        there, wrong = (
+            (method_errors.peak, method_errors.peak_error)
+            if peak
+            else (method_errors.period, method_errors.period_error)
+        )
         if there.size == 0:
             return None
         # A period below all measured ones would select the last, noisiest ones.

@@ -90,7 +90,7 @@ def _running_mean(time: Floats, x: Floats, half: float) -> tuple[Floats, float]:
 
 def _zigzag(x: Floats, threshold: float) -> Indices:
     """Return the indices of extremes after which the signal returns by more than a threshold."""
-    found: list[int] = []
+    extremes: list[int] = []
     values = x.tolist()
     low = high = 0
     rising: bool | None = None
@@ -102,13 +102,13 @@ def _zigzag(x: Floats, threshold: float) -> Indices:
         if rising is not False and value < values[high] - threshold:
             # The first extreme is the start of the record, which need not be a turn.
             if rising is not None:
-                found.append(high)
+                extremes.append(high)
             rising, low = False, k
         elif rising is not True and value > values[low] + threshold:
             if rising is not None:
-                found.append(low)
+                extremes.append(low)
             rising, high = True, k
-    return np.array(found, dtype=np.intp)
+    return np.array(extremes, dtype=np.intp)
 
 
 def zigzags(x: Floats, threshold: float, gaps: Indices) -> Indices:
@@ -120,13 +120,13 @@ def zigzags(x: Floats, threshold: float, gaps: Indices) -> Indices:
 
 def _far_apart(turns: Indices, time: Floats, period: float) -> Indices:
     """Return the turns without pairs that are closer than 0.3 periods."""
-    kept: list[int] = []
+    selected: list[int] = []
     for k in turns.tolist():
-        if kept and time[k] - time[kept[-1]] < 0.3 * period:
-            kept.pop()
+        if selected and time[k] - time[selected[-1]] < 0.3 * period:
+            selected.pop()
         else:
-            kept.append(k)
-    return np.array(kept, np.intp)
+            selected.append(k)
+    return np.array(selected, np.intp)
 
 
 _RESOLVED: Final = 8.0  # Least difference between successive peaks, standard errors
@@ -215,10 +215,10 @@ def stop(
     if not 0.1 < (rests - last.time) / course.period < 0.9:  # noqa: PLR2004 (a half, roughly)
         return None
     half = 0.25 * course.period
-    found = _joined(time[::-1] * -1.0, theta[::-1], sigma, (-time[-1], -rests, half), "stop")
-    if found is None or abs(found.angle - last.angle) < _SURE_END * last.stderr_angle:
+    end = _joined(time[::-1] * -1.0, theta[::-1], sigma, (-time[-1], -rests, half), "stop")
+    if end is None or abs(end.angle - last.angle) < _SURE_END * last.stderr_angle:
         return None
-    return dataclasses.replace(found, time=-found.time)
+    return dataclasses.replace(end, time=-end.time)
 
 
 def _joined(

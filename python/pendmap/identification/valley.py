@@ -66,12 +66,12 @@ def refine_exponent(  # noqa: PLR0913 (what to fit, and how)
         power = max(-FARTHEST, min(-step * follow[size] / fit[size], FARTHEST))
         start[size] = fit[size] * math.exp(power)
         try:
-            found = again(_with(fit.model, exponent, step), start, fit)
+            trial = again(_with(fit.model, exponent, step), start, fit)
         except FitDiverged:
             reach = SHORTER * abs(step)
             continue
-        if found.chi2 < fit.chi2:
-            fit = found
+        if trial.chi2 < fit.chi2:
+            fit = trial
         else:
             reach = SHORTER * abs(step)
     return fit
@@ -83,11 +83,11 @@ def _step(
     """Return an exponent's step, its expected gain, and derivatives of the other parameters."""
     seen = sensitivities(fit, runs, [exponent], fit.model)
     place = seen.names.index(exponent)
-    own, others = seen.columns[:, place], np.delete(seen.columns, place, axis=1)
+    column, others = seen.columns[:, place], np.delete(seen.columns, place, axis=1)
     sizes = np.linalg.norm(others, axis=0)
     sizes[sizes == 0] = 1.0
-    follow = np.linalg.lstsq(others / sizes, own)[0] / sizes
-    rest = own - others @ follow
+    follow = np.linalg.lstsq(others / sizes, column)[0] / sizes
+    rest = column - others @ follow
     information, pull = float(rest @ rest), float(rest @ seen.residual)
     names = [name for name in seen.names if name != exponent]
     if information <= 0:

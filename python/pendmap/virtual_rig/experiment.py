@@ -389,5 +389,5 @@ def paper_decay(seed: int = 0) -> tuple[Floats, Floats]:
     equation = Equation(PARAMETERS, Drive.harmonic(none, np.ones(1), none), none, [])
     times = SENSOR.times(SECONDS)
     reading = integrate(equation, starts)[0].angle(times) + OFFSET
-    angle, kept = SENSOR.write_down(reading, np.random.default_rng(seed))
-    return times[kept], angle[kept]
+    angle, written = SENSOR.write_down(reading, np.random.default_rng(seed))
+    return times[written], angle[written]

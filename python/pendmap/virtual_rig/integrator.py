@@ -134,9 +134,11 @@ def stop_of(margin: Callable[[float], float], seen: Floats) -> float | None:
             return root(margin, low, high) if seen[k - 1] > 0 else low + _TINY * (high - low)
         if 1 < k < PLACES.size - 1 and _dips(seen[k - 1 : k + 2]):
             ends = (PLACES[k - 1], PLACES[k + 1])
-            found = minimize_scalar(margin, bounds=ends, method="bounded", options={"xatol": 1e-9})
-            if found.fun < 0:
-                return root(margin, low, float(found.x))
+            minimum = minimize_scalar(
+                margin, bounds=ends, method="bounded", options={"xatol": 1e-9}
+            )
+            if minimum.fun < 0:
+                return root(margin, low, float(minimum.x))
     return None
 
 
@@ -158,23 +160,23 @@ class Switch(NamedTuple):
 
 def first_switches(lanes: Lanes, step: Step, rows: Indices) -> dict[int, Switch]:
     """Return the first event of each of the ``rows`` of a step that has one."""
-    found: dict[int, Switch] = {}
+    switches: dict[int, Switch] = {}
     slides = lanes.direction[step.lane[rows]] != 0
     if slides.any():
-        _turns(lanes, step, rows[slides], found)
+        _turns(lanes, step, rows[slides], switches)
     for k in rows[~slides].tolist():
-        _releases(lanes, step, k, found)
+        _releases(lanes, step, k, switches)
     if lanes.equation.watches_load:
-        _unloads(lanes, step, rows, found)
-    return found
+        _unloads(lanes, step, rows, switches)
+    return switches
 
 
-def _keep(found: dict[int, Switch], k: int, place: float | None, what: str) -> None:
-    if place is not None and (k not in found or place < found[k].place):
-        found[k] = Switch(place, what)
+def _keep(switches: dict[int, Switch], k: int, place: float | None, what: str) -> None:
+    if place is not None and (k not in switches or place < switches[k].place):
+        switches[k] = Switch(place, what)
 
 
-def _turns(lanes: Lanes, step: Step, rows: Indices, found: dict[int, Switch]) -> None:
+def _turns(lanes: Lanes, step: Step, rows: Indices, switches: dict[int, Switch]) -> None:
     """Add the velocity zeros of sliding lanes."""
     direction = lanes.direction[step.lane[rows]]
     sign = direction[:, np.newaxis]
@@ -185,23 +187,23 @@ def _turns(lanes: Lanes, step: Step, rows: Indices, found: dict[int, Switch]) ->
     for n in np.flatnonzero(may_turn(velocity, acceleration, step.length[rows])).tolist():
         k = int(rows[n])
         polynomials = step.velocity[k].tolist(), step.acceleration[k].tolist()
-        _keep(found, k, turn_of(*polynomials, float(direction[n]), velocity[n]), "rest")
+        _keep(switches, k, turn_of(*polynomials, float(direction[n]), velocity[n]), "rest")
 
 
-def _releases(lanes: Lanes, step: Step, k: int, found: dict[int, Switch]) -> None:
+def _releases(lanes: Lanes, step: Step, k: int, switches: dict[int, Switch]) -> None:
     """Add the place and direction at which a sticking lane slips."""
     lane = int(step.lane[k])
 
     def margins(places: Floats) -> tuple[Floats, Floats]:
-        own = gauss.basis(places, gauss.NODES + 1) @ step.own[k]
-        return lanes.margins(lane, places * step.length[k], own)
+        states = gauss.basis(places, gauss.NODES + 1) @ step.own[k]
+        return lanes.margins(lane, places * step.length[k], states)
 
     up, down = margins(PLACES)
-    _keep(found, k, stop_of(lambda s: float(margins(np.array([s]))[0][0]), up), "up")
-    _keep(found, k, stop_of(lambda s: float(margins(np.array([s]))[1][0]), down), "down")
+    _keep(switches, k, stop_of(lambda s: float(margins(np.array([s]))[0][0]), up), "up")
+    _keep(switches, k, stop_of(lambda s: float(margins(np.array([s]))[1][0]), down), "down")
 
 
-def _unloads(lanes: Lanes, step: Step, rows: Indices, found: dict[int, Switch]) -> None:
+def _unloads(lanes: Lanes, step: Step, rows: Indices, switches: dict[int, Switch]) -> None:
     """Add the places at which the load on the bearing changes sign."""
 
     def load(rows: Indices, places: Floats) -> Floats:
@@ -220,4 +222,4 @@ def _unloads(lanes: Lanes, step: Step, rows: Indices, found: dict[int, Switch]) 
         def here(s: float, row: Indices = row) -> float:
             return float(load(row, np.array([s]))[0, 0])
 
-        _keep(found, int(row[0]), stop_of(here, seen[n]), "unload")
+        _keep(switches, int(row[0]), stop_of(here, seen[n]), "unload")

@@ -86,16 +86,16 @@ class Lanes:
             self.side[lane, np.newaxis],
         )
 
-    def margins(self, lane: int, after: Floats, own: Floats) -> tuple[Floats, Floats]:
+    def margins(self, lane: int, after: Floats, states: Floats) -> tuple[Floats, Floats]:
         """Return the slip margins, rad/s^2, of a lane at rest, at S times ``after`` its own, s.
 
         It slips to positive angles where the first is negative, to negative angles where the second
-        is; ``own``, shape (S, M), holds the effects' state variables.
+        is; ``states``, shape (S, M), holds the effects' state variables.
         """
         still = np.zeros((1, after.size))
         time, theta = self.time[lane] + after[np.newaxis], self.theta[lane] + still
         motion = self.motion(np.array([lane]), time, theta, still)
-        load = self.equation.smooth(motion, own[np.newaxis])
+        load = self.equation.smooth(motion, states[np.newaxis])
         motion.direction = np.ones((1, 1))
         up = self.equation.friction(motion) - load
         motion.direction = -motion.direction
@@ -161,8 +161,8 @@ def solve(lanes: Lanes, lane: Indices) -> Step:
     theta = h * (velocity @ gauss.SECOND_INTEGRAL.T)
     theta[:, 0] += lanes.theta[lane]
     changes = gauss.COEFFICIENTS @ rates
-    own = h[:, :, np.newaxis] * (gauss.INTEGRAL @ changes)
-    own[:, 0, :] += lanes.own[lane]
+    states = h[:, :, np.newaxis] * (gauss.INTEGRAL @ changes)
+    states[:, 0, :] += lanes.own[lane]
     tail = length * np.abs(acceleration[:, -2:]).max(axis=1)
     if rates.size:
         tail = np.maximum(tail, length * np.abs(changes[:, -2:, :]).max(axis=(1, 2)))
@@ -173,7 +173,7 @@ def solve(lanes: Lanes, lane: Indices) -> Step:
     # A step shortened by ``stop`` is no evidence against the proposed length.
     early = good & (length < wished)
     wish = np.where(early, np.maximum(wish, wished), wish)
-    return Step(lane, length, acceleration, velocity, theta, own, good, wish)
+    return Step(lane, length, acceleration, velocity, theta, states, good, wish)
 
 
 def _iterate(
@@ -190,9 +190,9 @@ def _iterate(
     for _ in range(_ITERATIONS):
         velocity = velocity0 + h * (acceleration @ gauss.FIRST.T)
         theta = free + h**2 * (acceleration @ gauss.SECOND.T)
-        own = own0 + h[:, :, np.newaxis] * (gauss.FIRST @ rates) if rates.size else rates
+        states = own0 + h[:, :, np.newaxis] * (gauss.FIRST @ rates) if rates.size else rates
         motion = lanes.motion(lane, time, theta, velocity)
-        new, new_rates = lanes.equation.rates(motion, own)
+        new, new_rates = lanes.equation.rates(motion, states)
         change = length * np.abs(new - acceleration).max(axis=1)
         if rates.size:
             change = np.maximum(change, length * np.abs(new_rates - rates).max(axis=(1, 2)))

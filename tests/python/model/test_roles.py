@@ -147,7 +147,9 @@ def test_a_search_scans_typical_values(
     said = dict(zip("bc", zip((first, second), roles, strict=True), strict=True))
     shape = {n: {"power": 0, "role": r, "typical": typical} for n, (typical, r) in said.items()}
     formula = pendmap.Formula("own_effect", "-k*exp(-(b*theta)^2)*v/(1+c^2)", {"k": 1} | shape)
-    ((*found,),) = (c for c in list_candidates((), driven=False, own=[formula]) if c[0].formula)
+    ((*found,),) = (
+        c for c in list_candidates((), driven=False, user_formulas=[formula]) if c[0].formula
+    )
     assert found
     for one in found:
         for name, ((low, high), role) in said.items():

@@ -89,10 +89,10 @@ class Identification(Parameters):
         """Method and estimates in one line; numbers in SI, standard errors in parentheses."""
         if not self.applicable:
             return f"{self.method}: {'; '.join(self.warnings)}"
-        found = ", ".join(
-            f"{name} = {estimate_text(each)}" for name, each in self.estimates.items()
+        text = ", ".join(
+            f"{name} = {estimate_text(estimate)}" for name, estimate in self.estimates.items()
         )
-        return f"{self.method}: {found}" + ("" if self.converged else "; did not converge")
+        return f"{self.method}: {text}" + ("" if self.converged else "; did not converge")
 
     @property
     def sound(self) -> bool:
@@ -102,16 +102,18 @@ class Identification(Parameters):
         """
         w0 = self.estimates["w0"].value if "w0" in self.estimates else math.nan
         damping = [self.estimates[name] for name in OPPOSING if name in self.estimates]
-        driven = any(each.ci95 is not None and each.ci95[1] < 0 for each in damping)
+        driven = any(estimate.ci95 is not None and estimate.ci95[1] < 0 for estimate in damping)
         return self.applicable and self.converged and 0 < w0 < math.inf and not driven
 
     def with_clock(self, stderr: float) -> Identification:
         """Return the result with the relative standard error of a sampling interval added."""
         estimates, further = {}, {}
         for name, e in self.estimates.items():
-            own = further[name] = stderr * PLACES[name][1] * e.value if name in PLACES else 0.0
-            error = None if e.stderr is None else math.hypot(e.stderr, own)
-            ends = None if e.ci95 is None else widened(e.value, e.ci95, own)
+            clock_error = further[name] = (
+                stderr * PLACES[name][1] * e.value if name in PLACES else 0.0
+            )
+            error = None if e.stderr is None else math.hypot(e.stderr, clock_error)
+            ends = None if e.ci95 is None else widened(e.value, e.ci95, clock_error)
             estimates[name] = Estimate(e.value, error, ends)
         covariance = self.covariance
         if covariance is not None:

@@ -110,7 +110,7 @@ def triplets(peaks: Floats) -> tuple[Floats, Floats]:
 def from_amplitudes(peaks: Floats, times: Floats, reading: Reading, parity: int) -> Decrement:
     """Return the result of eqs. 2.7 and 2.10; ``parity`` is that of the first peak's number."""
     if reading == "odd_triplets":
-        deltas, thetas = (each[1 - parity :: 2] for each in triplets(peaks))
+        deltas, thetas = (values[1 - parity :: 2] for values in triplets(peaks))
         delta, theta_r = float(np.mean(deltas)), float(np.mean(thetas))
     else:
         used = peaks
@@ -179,8 +179,8 @@ def from_peaks(
 
     values = np.concatenate((size, small.time))
     stderr = np.concatenate((small.stderr_amplitude, small.stderr_time))
-    found = compute(values)
-    if not np.isfinite(found).all():
+    estimates = compute(values)
+    if not np.isfinite(estimates).all():
         reason = "a difference of peaks has the wrong sign: no logarithm in eq. 2.7"
         return inapplicable(reason, warnings)
     covariance = propagated(compute, values, stderr)
@@ -196,7 +196,7 @@ def from_peaks(
         )
     return identified(
         names,
-        found,
+        estimates,
         covariance,
         intervals=intervals,
         used=(

@@ -46,7 +46,7 @@ def from_peaks(
         if len(some) < _FEWEST
     ]
     if lacking:
-        texts = tuple(text for each in lacking for text in each.warnings)
+        texts = tuple(text for result in lacking for text in result.warnings)
         return Identification(warnings=texts, applicable=False)
     quick, slack = chosen["fast"], chosen["slow"]
     warnings = []
@@ -73,11 +73,11 @@ def from_peaks(
     inner = np.array([speed.w0, rate[1], fall[1]])
     errors = np.array([speed.stderr, rate_cov[1, 1] ** 0.5, fall_cov[1, 1] ** 0.5])
     covariance = propagated(compute, inner, errors)
-    found = compute(inner)
+    estimates = compute(inner)
     names = ("w0", "c_over_m", "Tr")
     return identified(
         names,
-        found,
+        estimates,
         covariance,
         used=(
             f"exponential through the {len(quick)} peaks {_between(fast)}, straight line through "

@@ -66,11 +66,11 @@ def from_peaks(peaks: Peaks, record: tuple[Floats, Floats] | None) -> Identifica
     zeta = float(values[0]) / (2 * w0)
     period = frequency(small, zeta=min(abs(zeta), 0.9), offset=zero)
     names = ("w0", "c_over_m", "Tr", "offset")
-    found = np.array([period.w0, values[0], values[1], zero])
+    estimates = np.array([period.w0, values[0], values[1], zero])
     # Energies are in units of w0^2: its error propagates to both dampings.
     full = np.zeros((4, 4))
     full[1:, 1:] = covariance
-    lever = np.array([1.0, 2 * found[1] / period.w0, 2 * found[2] / period.w0, 0.0])
+    lever = np.array([1.0, 2 * estimates[1] / period.w0, 2 * estimates[2] / period.w0, 0.0])
     full += np.outer(lever, lever) * period.stderr**2
     warnings = []
     period_samples = 2 * math.pi / w0 / float(np.median(np.diff(record[0])))
@@ -86,7 +86,7 @@ def from_peaks(peaks: Peaks, record: tuple[Floats, Floats] | None) -> Identifica
         )
     return identified(
         names,
-        found,
+        estimates,
         full,
         used=(
             f"{pairs.size} half cycles between peaks {turned.index[0]} and {turned.index[-1]}; w0 "

@@ -67,7 +67,7 @@ def from_peaks(peaks: Peaks, *, reading: Reading = "ends", cut: float = CUT) -> 
         return np.array([w0, 2 * zeta * w0])
 
     values = np.concatenate((size, small.time))
-    found = compute(values)
+    estimates = compute(values)
     stderr = np.concatenate((small.stderr_amplitude, small.stderr_time))
     covariance = propagated(compute, values, stderr)
     if not small.known:
@@ -84,7 +84,7 @@ def from_peaks(peaks: Peaks, *, reading: Reading = "ends", cut: float = CUT) -> 
     way = "the first and the last of" if reading == "ends" else "a line through the logarithms of"
     return identified(
         names,
-        found,
+        estimates,
         covariance,
         used=(
             f"{way} peaks {small.index[0]} to {small.index[-1]} ({count}{under}); the mean of "

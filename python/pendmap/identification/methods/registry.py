@@ -81,16 +81,16 @@ def identify_record(  # noqa: PLR0913 (the record, and what is known of it)
     known: dict[str, Any] = {"sigma": sigma, "trusted": trusted}
     if peaks is None and names != [BEST]:
         peaks = find_peaks(time, theta, **known)
-    found = {}
+    results = {}
     for name in names:
         if peaks is None or name == BEST:
             one = trajectory.identify(time, theta, **known)
         else:
             one = _OF_PEAKS[name](peaks.later(-first), record)
-        found[name] = dataclasses.replace(one, method=name)
+        results[name] = dataclasses.replace(one, method=name)
         if progress is not None:
-            progress(len(found), len(names))
-    return found
+            progress(len(results), len(names))
+    return results
 
 
 def identify_peaks(peaks: Peaks, methods: Iterable[str] | None = None) -> dict[str, Identification]:
@@ -107,15 +107,15 @@ def identify_peaks(peaks: Peaks, methods: Iterable[str] | None = None) -> dict[s
             stderr_time=np.full(size, scatter(peaks.time)),
             stderr_amplitude=np.full(size, scatter(np.abs(peaks.amplitude))),
         )
-    found = {}
+    results = {}
     for name in check_names(methods):
         one = inapplicable(NEEDS_SAMPLES) if name == BEST else _OF_PEAKS[name](peaks, None)
-        found[name] = one = dataclasses.replace(one, method=name)
+        results[name] = one = dataclasses.replace(one, method=name)
         # Errors of 0 are unknown errors; a fit estimates errors from its residuals.
-        if not peaks.known and not any(each.stderr for each in one.estimates.values()):
-            bare = {n: Estimate(each.value) for n, each in one.estimates.items()}
-            found[name] = dataclasses.replace(one, estimates=bare, covariance=None)
-    return found
+        if not peaks.known and not any(estimate.stderr for estimate in one.estimates.values()):
+            bare = {n: Estimate(estimate.value) for n, estimate in one.estimates.items()}
+            results[name] = dataclasses.replace(one, estimates=bare, covariance=None)
+    return results
 
 
 FEWEST: Final = 16  # Fewest values from which a scatter is estimated: eight differences, to a third

@@ -92,10 +92,10 @@ def from_peaks(peaks: Peaks, *, cut: float = CUT) -> Identification:
     slopes = jacobian(si, values, np.sqrt(np.diag(inner)) / 10)
     outer = slopes @ inner @ slopes.T
     names = ("w0", "c_over_m", "Tr", "offset")
-    found = si(values)
+    estimates = si(values)
     return identified(
         names,
-        found,
+        estimates,
         outer,
         used=(
             f"peaks {small.index[0]} to {small.index[-1]} ({count}, under {math.degrees(cut):.3g} "

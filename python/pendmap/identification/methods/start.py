@@ -96,14 +96,18 @@ def global_start(peaks: Peaks, *, seed: int = 0) -> dict[str, float]:
     return {"w0": w0, "c_over_m": float(gamma * w0), "Tr": float(theta_r * w0**2)}
 
 
-def _start_of(found: Identification) -> dict[str, float] | None:
+def _start_of(result: Identification) -> dict[str, float] | None:
     """Return starting values from a method's result; None if they are implausible."""
-    if not found.applicable:
+    if not result.applicable:
         return None
     for name in OPPOSING:
-        estimate = found.estimates[name]
+        estimate = result.estimates[name]
         if not math.isfinite(estimate.value) or estimate.value < -3 * (estimate.stderr or 0.0):
             return None
-    if not found["w0"] > 0 or (found.misfit is not None and found.misfit > _MISFIT):
+    if not result["w0"] > 0 or (result.misfit is not None and result.misfit > _MISFIT):
         return None
-    return {"w0": found["w0"], "c_over_m": max(found["c_over_m"], 0.0), "Tr": max(found["Tr"], 0.0)}
+    return {
+        "w0": result["w0"],
+        "c_over_m": max(result["c_over_m"], 0.0),
+        "Tr": max(result["Tr"], 0.0),
+    }

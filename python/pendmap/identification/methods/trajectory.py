@@ -66,11 +66,11 @@ def identification_of(joint: JointFit) -> Identification:
     names = tuple(renamed.get(name, name) for name in fit.names)
     # If the model does not fit, errors are widened by the misfit.
     wider = math.sqrt(fit.widening)
-    found = [
+    widened_estimates = [
         dataclasses.replace(e, stderr=None if e.stderr is None else wider * e.stderr)
         for e in fit.estimates.values()
     ]
-    estimates = dict(zip(names, found, strict=True))
+    estimates = dict(zip(names, widened_estimates, strict=True))
     for name, limit in joint.limits.items():
         estimates[name] = Estimate(0.0, None, (0.0, limit))
     first = [name for name in ("w0", *OPPOSING) if name in estimates]
@@ -126,7 +126,7 @@ def _reaches_0(estimate: Estimate) -> bool:
 
 
 def _warnings(joint: JointFit, estimates: Mapping[str, Estimate]) -> list[str]:
-    fit, readings, found = joint.fit, joint.readings, []
+    fit, readings, warnings = joint.fit, joint.readings, []
     every = {**estimates, **joint.negative}
     for name in opposing(fit.model.effects):
         if name in every and every[name].value < 0:
@@ -136,34 +136,34 @@ def _warnings(joint: JointFit, estimates: Mapping[str, Estimate]) -> list[str]:
                 why += "; it is held at 0, and the others are fitted again"
             elif name in OPPOSING:
                 why += "; the model has 0 in its place"
-            found.append(f"{name} is {every[name].value:.3g}, which is unphysical: {why}")
+            warnings.append(f"{name} is {every[name].value:.3g}, which is unphysical: {why}")
     ratio = fit.chi2 / max(fit.degrees, 1)
     if fit.widening > 1:
-        found.append(
+        warnings.append(
             f"the model does not fit: residuals are {fit.rms / joint.noise:.3g} times the noise; "
             f"errors are {math.sqrt(fit.widening):.2g} times as wide; an effect is missing in the "
             "model"
         )
     elif ratio < TOO_GOOD and not any(reading.coarse for reading in readings):
-        found.append(f"residuals are {math.sqrt(ratio):.2g} times sigma: sigma is too large")
+        warnings.append(f"residuals are {math.sqrt(ratio):.2g} times sigma: sigma is too large")
     if not fit.converged:
-        found.append("the search did not converge")
+        warnings.append("the search did not converge")
     # A sensor's tilt is determined by large swings only: its interval is not reported.
     wanted = {name: e for name, e in estimates.items() if name.partition("[")[0] not in SENSOR}
     lost = [name for name, e in wanted.items() if e.ci95 is None and name not in joint.negative]
     if lost:
-        found.append(f"no finite interval was found for {', '.join(lost)}")
+        warnings.append(f"no finite interval was found for {', '.join(lost)}")
     laws = [reading.law for reading in readings if reading.law]
-    found += [
+    warnings += [
         f"{law}: readings are weighted by the noise at their {law.grows_with}" for law in laws
     ]
     coarse = [f"{r.gain * r.count:.3g} {r.unit}" for r in readings if r.coarse]
     if coarse:
-        found.append(
+        warnings.append(
             f"the sensor's count ({', '.join(dict.fromkeys(coarse))}) is coarser than its noise: "
             "readings are fitted as intervals"
         )
-    return found
+    return warnings
 
 
 def fit_from_start(
@@ -205,23 +205,23 @@ def fit_from_start(
         model = dataclasses.replace(model, effects=tuple(e.held(held) for e in known))
         return fit_runs(runs, model, [*names, *sizes], sigma_doubt=doubt)
 
-    found = fitted(start)
-    if found.widening > LACKING and any(reading.law for reading in readings):
+    fit = fitted(start)
+    if fit.widening > LACKING and any(reading.law for reading in readings):
         readings = [dataclasses.replace(r, each=r.alike, law=None) for r in readings]
         runs = [
             dataclasses.replace(run, sigma=r.each) for run, r in zip(runs, readings, strict=True)
         ]
-        found = fitted(start)
-    poor = not found.converged or found.rms > POOR * float(np.std(theta))
+        fit = fitted(start)
+    poor = not fit.converged or fit.rms > POOR * float(np.std(theta))
     if isinstance(start, Rig) or not poor:
-        return found, tuple(readings)
+        return fit, tuple(readings)
     try:
         by_peaks = starting_values(time, theta, sigma=readings[0].sigma)
         again = fitted(dict(start or {}) | by_peaks)
     except (FitDiverged, TooShortError):
-        return found, tuple(readings)
-    better = (again.converged, -again.chi2) > (found.converged, -found.chi2)
-    return again if better else found, tuple(readings)
+        return fit, tuple(readings)
+    better = (again.converged, -again.chi2) > (fit.converged, -fit.chi2)
+    return again if better else fit, tuple(readings)
 
 
 def _start_of(
