@@ -188,7 +188,7 @@ def _refuse_divergence(experiment: Experiment) -> Iterator[None]:
         ) from None
 
 
-def diagnosed_model(found: Discrepancy, command: str = "") -> Rig:
+def diagnosed_model(diagnosis: Discrepancy, command: str = "") -> Rig:
     """Return the model of a diagnosis with the notes for its file.
 
     ``[covariance]`` is that of :attr:`Discrepancy.model`; ``[provenance]`` holds the records with
@@ -196,7 +196,7 @@ def diagnosed_model(found: Discrepancy, command: str = "") -> Rig:
 
     Parameters
     ----------
-    found : Discrepancy
+    diagnosis : Discrepancy
         From :func:`pendmap.diagnose`.
     command : str
         The command line.
@@ -206,17 +206,19 @@ def diagnosed_model(found: Discrepancy, command: str = "") -> Rig:
     Rig
         The best model, with its notes.
     """
-    runs = [found.data.runs[k] for k in dict.fromkeys(found.data.fitted_of)]
-    sha256 = found.data.experiment.sha256
+    runs = [diagnosis.data.runs[k] for k in dict.fromkeys(diagnosis.data.fitted_of)]
+    sha256 = diagnosis.data.experiment.sha256
     files = {run.file: run.sha256 or sha256.get(run.file, "") for run in runs}
     notes: dict[str, Any] = {
-        "provenance": provenance(files, command, rms=found.gap.after, noise=found.gap.noise_floor)
+        "provenance": provenance(
+            files, command, rms=diagnosis.gap.after, noise=diagnosis.gap.noise_floor
+        )
         | {
             "method": "diagnose",
-            "verdict": found.verdict,
-            "held_out": list(dict.fromkeys(run.name for run in found.data.held)),
+            "verdict": diagnosis.verdict,
+            "held_out": list(dict.fromkeys(run.name for run in diagnosis.data.held)),
         },
     }
-    if found.best.fitted.zeroed:
-        notes["provenance"]["set_to_zero"] = list(found.best.fitted.zeroed)
-    return dataclasses.replace(found.model, notes={**found.model.notes, **notes})
+    if diagnosis.best.fitted.zeroed:
+        notes["provenance"]["set_to_zero"] = list(diagnosis.best.fitted.zeroed)
+    return dataclasses.replace(diagnosis.model, notes={**diagnosis.model.notes, **notes})
