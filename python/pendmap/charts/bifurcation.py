@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from pendmap._core import Attractor
 from pendmap.analysis.orbit_table import attractors_of
 from pendmap.charts import names, palette, parameters, plane
 from pendmap.charts.chart import Axis, Chart, Panel
@@ -135,25 +136,34 @@ def _text(every: list[Family], k: int) -> str:
 def families(dataset: xr.Dataset) -> list[Family]:
     """Return the families, ordered by the number of values at which they occur.
 
-    Chaos is always among the :data:`MOST` named ones, however rare.
+    Twins that lean to opposite sides are of one family. Chaos is always among the :data:`MOST`
+    named ones, however rare.
     """
-    which, value = dataset["entry_kind"].values, dataset["entry_value"].values
-    every = attractors_of(dataset, "kind_")
-    count = np.bincount(which, minlength=len(every))
-    owner = dataset["point_entry"].values
+    every, called = attractors_of(dataset, "kind_"), dataset["kind"].values
+    shades = colours_of(dataset, "kind_")
+    members: dict[tuple[str, int | None, int], list[int]] = {}
+    for k, one in enumerate(every):
+        members.setdefault((one.kind, one.n, one.w), []).append(k)
+    group = np.zeros(len(every), dtype=np.intp)
+    for number, places in enumerate(members.values()):
+        places.sort(key=lambda k: abs(every[k].lean))
+        group[places] = number
+    which, value = group[dataset["entry_kind"].values], dataset["entry_value"].values
+    count = np.bincount(which, minlength=len(members))
     points = np.column_stack([dataset["point_value"].values, plane.points(dataset)])
+    of_point = which[dataset["point_entry"].values]
     sweeps = {key: np.append(which, -1)[dataset[key].values] for key in ("up", "down")}
     listed: list[Family] = []
-    regular = np.array([not one.chaotic for one in every], dtype=bool)
+    regular = np.array([not every[places[0]].chaotic for places in members.values()], dtype=bool)
     first = np.lexsort((-count, regular, count == 0))[:MOST]
-    shades, called = colours_of(dataset, "kind_"), dataset["kind"].values
-    for k in np.lexsort((-count, ~np.isin(np.arange(count.size), first)))[: np.sum(count > 0)]:
-        mine = which == k
-        exponents = np.stack([value[mine], dataset["entry_exponent"].values[mine]], axis=1)
-        shade = palette.on_white(shades[k]) if len(listed) < MOST else palette.UNNAMED
-        look, on = (
-            (str(called[k]), shade, every[k].chaotic),
-            (sweeps["up"] == k, sweeps["down"] == k),
-        )
-        listed.append(Family(*look, points[mine[owner]], exponents, *on))
+    order = np.lexsort((-count, ~np.isin(np.arange(count.size), first)))[: np.sum(count > 0)]
+    for k in order.tolist():
+        (kind, n, w), places = [*members.items()][k]
+        here = which == k
+        exponents = np.stack([value[here], dataset["entry_exponent"].values[here]], axis=1)
+        name = str(called[places[0]]) if len(places) == 1 else Attractor(kind, n, w).name
+        shade = palette.on_white(shades[places[0]]) if len(listed) < MOST else palette.UNNAMED
+        on = (sweeps["up"] == k, sweeps["down"] == k)
+        chaotic = every[places[0]].chaotic
+        listed.append(Family(name, shade, chaotic, points[of_point == k], exponents, *on))
     return listed

@@ -207,11 +207,12 @@ _DRAW: Final[dict[type[Mark], Callable[[Axes, Any], None]]] = {
 def legend(marks: Sequence[Mark]) -> dict[str, Any]:
     """Return the handles of the named marks by their texts; equal names share one entry."""
     named: dict[str, list[Any]] = {}
-    drawn = {mark.name for mark in marks}
+    # Points that are nowhere are entries of the legend alone.
+    alone = {m.name for m in marks if isinstance(m, charts.Points) and not np.size(m.x)}
     for mark in marks:
         if isinstance(mark, charts.Image):
             for name, colour in mark.classes:
-                if name in drawn:  # the mark shows the colour too
+                if name in alone:
                     continue
                 patch = Patch(facecolor=colour, edgecolor=charts.QUIET, linewidth=0.5)
                 named.setdefault(name, []).append(patch)
