@@ -158,7 +158,9 @@ def sampling(work: Work) -> Finding | None:
 
 
 def zero(work: Work) -> Finding | None:
-    """Shift the zero of the angle to the rest position if it is far from it."""
+    """Shift the zero of the angle of a free run to the rest position if it is far from it."""
+    if not work.free:
+        return None
     good = work.trusted
     middle = middle_of(work.time[good], work.theta[good])
     # Whole turns are due to rotations over the top.

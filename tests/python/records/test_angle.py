@@ -92,6 +92,15 @@ def test_a_recorded_rest_determines_the_zero(tmp_path: Path) -> None:
     np.testing.assert_allclose(run.theta, theta, atol=0.01)
 
 
+@pytest.mark.parametrize("off", [0.5, math.pi / 2])
+def test_the_zero_of_a_forced_run_is_left_alone(tmp_path: Path, off: float) -> None:
+    time, theta = clean(start=1.2, duration=40.0)
+    described = '[[run]]\nfile = "run.csv"\nkind = "forced"\ndrive = { p = 0.3, Omega = 9.0 }\n'
+    (run,) = experiment(tmp_path, described, run=text((time, theta + off))).runs
+    np.testing.assert_allclose(run.theta, theta + off, atol=1e-6)
+    assert not {f.what for f in run.findings} & {"zero-uncertain", "zero-offset", "gauge-turned"}
+
+
 def test_angles_too_large_are_reported(tmp_path: Path) -> None:
     time, theta = clean()
     theta[-200:] = 0
