@@ -161,7 +161,7 @@ def families(dataset: xr.Dataset) -> list[Family]:
         (kind, n, w), places = [*members.items()][k]
         here = which == k
         exponents = np.stack([value[here], dataset["entry_exponent"].values[here]], axis=1)
-        name = str(called[places[0]]) if len(places) == 1 else Attractor(kind, n, w).name
+        name = str(called[places[0]]) if len(places) == 1 else Attractor(kind, n or 0, w).name
         shade = palette.on_white(shades[places[0]]) if len(listed) < MOST else palette.UNNAMED
         on = (sweeps["up"] == k, sweeps["down"] == k)
         chaotic = every[places[0]].chaotic
