@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Unpack
 
 import numpy as np
 
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from pendmap.analysis.along import Varied
+    from pendmap.analysis.run import Keywords
     from pendmap.analysis.sweeps.table import Numbers
     from pendmap.engine import Store, Work
     from pendmap.model import Pendulum, Rig
@@ -88,6 +89,7 @@ def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     layer_periods: int | None = None,
     check: bool = True,
     run: RunOptions | None = None,
+    **options: Unpack[Keywords],
 ) -> xr.Dataset:
     """Map the basins of attraction along one or two parameters, and match the attractors.
 
@@ -167,7 +169,7 @@ def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     bare, units = without_dimensions(pendulum)
     axes = varied.varied(pendulum, ranges, len(ranges))
     grid = Grid.of(grid, DEFAULT_CELLS, units.given(1.0, VELOCITY))
-    run = RunOptions.of(run)
+    run = RunOptions.of(run, options)
     numerics = Numerics(run, tol, max_periods)
     choices = choices_of(numerics, layer_periods, check=check)
     job = SweepTiles(bare, tuple(axis.kernel for axis in axes), grid.bare(units), choices)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Unpack
 
 import numpy as np
 import xarray as xr
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from pendmap import _core
+    from pendmap.analysis.run import Keywords
     from pendmap.model import Pendulum, Rig
     from pendmap.signal import Floats
 
@@ -135,6 +136,7 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     check: bool = True,
     draws: int | None = None,
     run: RunOptions | None = None,
+    **options: Unpack[Keywords],
 ) -> xr.Dataset:
     """Compute the basins of attraction: the attractor on which each initial condition ends.
 
@@ -176,6 +178,8 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     run : RunOptions, optional
         Threads, seed, progress, the store of the tiles and who computes them
         (:class:`pendmap.RunOptions`); tiles are of about 2^20 starts.
+    options
+        Options of the run by name: ``threads=2, store="map.zarr"``.
 
     Returns
     -------
@@ -223,7 +227,7 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     """
     bare, units = without_dimensions(pendulum)
     grid = Grid.of(grid, DEFAULT_CELLS, units.given(1.0, VELOCITY))
-    run = RunOptions.of(run)
+    run = RunOptions.of(run, options)
     numerics = Numerics(run, tol, max_periods)
     choices = choices_of(numerics, layer_periods, check=check)
     if draws is not None:
@@ -271,6 +275,7 @@ def basins_of(  # noqa: PLR0913 (as for basins)
     layer_periods: int | None = None,
     check: bool = True,
     run: RunOptions | None = None,
+    **options: Unpack[Keywords],
 ) -> xr.Dataset:
     """Find the attractor on which each start of a list ends.
 
@@ -302,7 +307,7 @@ def basins_of(  # noqa: PLR0913 (as for basins)
     array([1, 1], dtype=int16)
     """
     bare, units = without_dimensions(pendulum)
-    run = RunOptions.of(run).in_memory("a list of starts")
+    run = RunOptions.of(run, options).in_memory("a list of starts")
     numerics = Numerics(run, tol, max_periods)
     choices = choices_of(numerics, layer_periods, check=check)
     angles, speeds = starts(theta, velocity)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 import xarray as xr
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from pendmap import _core
     from pendmap.analysis.along import Varied
     from pendmap.analysis.grid import Grid
+    from pendmap.analysis.run import Keywords
     from pendmap.engine import Work
     from pendmap.model import Pendulum, Rig
     from pendmap.signal import Floats, Mask
@@ -73,6 +74,7 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     tol: float = 1e-6,
     max_periods: int | None = None,
     run: RunOptions | None = None,
+    **options: Unpack[Keywords],
 ) -> xr.Dataset:
     """Compute the stroboscopic points of the attractors against one parameter.
 
@@ -129,7 +131,7 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     pendulum = varied.having(pendulum, ranges)
     bare, units = without_dimensions(pendulum)
     (axis,) = varied.varied(pendulum, ranges, 1)
-    run = RunOptions.of(run)
+    run = RunOptions.of(run, options)
     numerics = Numerics(run, tol, max_periods)
     search = cell_search.CellSearch(starts, box, numerics)
     first = None

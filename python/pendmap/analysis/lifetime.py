@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Unpack
 
 import numpy as np
 
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from pendmap.analysis.draws import Analysis, Draws
+    from pendmap.analysis.run import Keywords
     from pendmap.engine import Work
     from pendmap.model import Pendulum, Rig
 
@@ -119,6 +120,7 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
     tol: float = 1e-6,
     draws: int | None = None,
     run: RunOptions | None = None,
+    **options: Unpack[Keywords],
 ) -> xr.Dataset:
     """Estimate the mean lifetime of transient chaos from the exponential tail of capture times.
 
@@ -184,7 +186,7 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
     bare, units = without_dimensions(pendulum)
     starts = check_whole("starts", starts, survival.LEAST, _MOST_STARTS)
     from_period = optional_whole("from_period", from_period, 0, MOST_PERIODS)
-    run = RunOptions.of(run)
+    run = RunOptions.of(run, options)
     numerics = Numerics(run, tol, max_periods)
     if (theta is None) != (velocity is None):
         raise InputError("both or none of theta and velocity must be given, got one")

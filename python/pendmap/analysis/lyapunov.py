@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 import xarray as xr
@@ -22,6 +22,7 @@ from pendmap.model import without_dimensions
 from pendmap.units import RATE, TIME, VELOCITY, Units
 
 if TYPE_CHECKING:
+    from pendmap.analysis.run import Keywords
     from pendmap.model import Pendulum, Rig
     from pendmap.signal import Floats
 
@@ -92,6 +93,7 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
     tol: float = 1e-6,
     max_periods: int | None = None,
     run: RunOptions | None = None,
+    **options: Unpack[Keywords],
 ) -> xr.Dataset:
     """Compute the largest Lyapunov exponent of the attractor that a start reaches.
 
@@ -165,7 +167,7 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
         raise InputError(
             f"precision must be a number above 0, up to {_MOST_PRECISION}, got {precision:g}"
         )
-    run = RunOptions.of(run).in_memory("lyapunov")
+    run = RunOptions.of(run, options).in_memory("lyapunov")
     numerics = Numerics(run, tol, max_periods)
     choices: _core._ExponentChoices = {"precision": precision, **numerics.core}
     with core_errors():

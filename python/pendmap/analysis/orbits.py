@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 import xarray as xr
@@ -26,6 +26,7 @@ from pendmap.units import VELOCITY, Units
 
 if TYPE_CHECKING:
     from pendmap.analysis.draws import Analysis, Draws
+    from pendmap.analysis.run import Keywords
     from pendmap.model import Pendulum, Rig
 
 
@@ -89,6 +90,7 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
     *,
     draws: int | None = None,
     run: RunOptions | None = None,
+    **options: Unpack[Keywords],
 ) -> xr.Dataset:
     """Find all periodic orbits of smallest period ``n`` and ``w`` net turns, stable and unstable.
 
@@ -143,7 +145,7 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
     bare, units = without_dimensions(pendulum)
     n = check_whole("n", n, 1, LONGEST)
     w = check_whole("w", w, -MOST_CELLS, MOST_CELLS)
-    run = RunOptions.of(run).in_memory("orbit")
+    run = RunOptions.of(run, options).in_memory("orbit")
     numerics = Numerics(run)
     grid = window(pendulum, n, w) if grid is None else grid
     check_type("grid", grid, Grid, "Grid.square(200)")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 import xarray as xr
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from pendmap.analysis.along import Varied
     from pendmap.analysis.draws import Analysis, Draws
     from pendmap.analysis.grid import Grid
+    from pendmap.analysis.run import Keywords
     from pendmap.engine import Work
     from pendmap.model import Pendulum, Rig
     from pendmap.units import Units
@@ -104,6 +105,7 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     curves: bool = False,
     draws: int | None = None,
     run: RunOptions | None = None,
+    **options: Unpack[Keywords],
 ) -> xr.Dataset:
     """Find the set of attractors in every cell of a plane of two parameters.
 
@@ -188,7 +190,7 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     pendulum = varied.having(pendulum, ranges)
     bare, units = without_dimensions(pendulum)
     columns, rows = varied.varied(pendulum, ranges, 2)
-    run = RunOptions.of(run)
+    run = RunOptions.of(run, options)
     numerics = Numerics(run, tol, max_periods)
     search = cell_search.CellSearch(starts, box, numerics)
     curves = check_flag("curves", curves)

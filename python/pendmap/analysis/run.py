@@ -7,7 +7,7 @@ import hashlib
 import importlib.util
 import os
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, TypedDict
 
 import numpy as np
 
@@ -48,9 +48,24 @@ _DIGEST: Final = "sha256 "
 _STEPS: Final = 10_000  # Number of progress steps of a part of a computation
 
 
+class Keywords(TypedDict, total=False):
+    """Options of a run as keywords of an analysis."""
+
+    threads: int | None
+    seed: int
+    progress: Progress | None
+    store: str | os.PathLike[str] | None
+    resume: bool
+    executor: Any
+    chunks: Any
+
+
 @dataclasses.dataclass(frozen=True)
 class RunOptions:
     """How an analysis is computed. Of these only ``seed`` changes a number of the result.
+
+    An analysis takes one, ``run=RunOptions(threads=2, seed=1)``, or its options by name,
+    ``threads=2, seed=1``.
 
     Parameters
     ----------
@@ -112,12 +127,11 @@ class RunOptions:
             raise InputError("chunks need the extra pendmap[dask]")
 
     @classmethod
-    def of(cls, run: RunOptions | None) -> RunOptions:
-        """Return what is given for ``run``, by default the defaults."""
-        if run is None:
-            return cls()
+    def of(cls, run: RunOptions | None, options: Keywords) -> RunOptions:
+        """Return what is given for ``run``, by default the defaults, with options by name."""
+        run = cls() if run is None else run
         check_type("run", run, cls, "RunOptions(threads=2)")
-        return run
+        return dataclasses.replace(run, **options) if options else run
 
     @property
     def workers(self) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias, Unpack
 
 import numpy as np
 import xarray as xr
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from pendmap.analysis.draws import Analysis, Draws
+    from pendmap.analysis.run import Keywords
     from pendmap.model import Pendulum, Rig
     from pendmap.signal import Floats, Mask
 
@@ -120,6 +121,7 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     refine: bool = False,
     draws: int | None = None,
     run: RunOptions | None = None,
+    **options: Unpack[Keywords],
 ) -> xr.Dataset:
     """Compute the critical curves of rest, exact, with folds and asymptotic curves.
 
@@ -201,7 +203,7 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
             omega = 1 / np.sqrt(np.linspace(1 / low**2, 1 / high**2, count))
     asked = grids.frequencies(omega)
     p_max = check_number("p_max", p_max)
-    run = RunOptions.of(run).in_memory("tongues")
+    run = RunOptions.of(run, options).in_memory("tongues")
     numerics = Numerics(run)
     if plane not in PLANES:
         raise InputError(f"plane must be one of {', '.join(PLANES)}, got {short_repr(plane)}")
@@ -404,9 +406,8 @@ def tongues_over(dataset: xr.Dataset, draws: Draws, analysis: Analysis) -> xr.Da
     (D, parameter).
     """
     tables = _TABLES.values()
-    every = [
-        {table: _numbered(one, prefix) for table, prefix in tables} for one in draws.each(analysis)
-    ]
+    results = draws.each(analysis)
+    every = [{table: _numbered(one, prefix) for table, prefix in tables} for one in results]
     with_draws = dataset
     for table, prefix in tables:
         mine = [[one[table].get(k, np.nan) for one in every] for k in _numbered(dataset, prefix)]

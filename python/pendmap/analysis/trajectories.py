@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Unpack
 
 import numpy as np
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
+    from pendmap.analysis.run import Keywords
     from pendmap.model import Pendulum, Rig
     from pendmap.signal import Floats
     from pendmap.units import Units
@@ -101,6 +102,7 @@ def advance(  # noqa: PLR0913
     tol: float = 1e-6,
     steps_per_period: int | None = None,
     run: RunOptions | None = None,
+    **options: Unpack[Keywords],
 ) -> tuple[Floats, Floats, NDArray[np.int64]]:
     """Advance many starts by the same number of periods.
 
@@ -138,7 +140,7 @@ def advance(  # noqa: PLR0913
     (array([1.318]), array([-0.27]))
     """
     pendulum, units = without_dimensions(pendulum)
-    run = RunOptions.of(run).in_memory("advance")
+    run = RunOptions.of(run, options).in_memory("advance")
     numerics = Numerics(run, tol)
     angles, speeds = starts(theta, velocity)
     speeds = units.bare(speeds, VELOCITY)

@@ -138,6 +138,17 @@ REFUSED = {
 def test_options_of_runs_are_checked(given: dict[str, Any], text: str) -> None:
     with pytest.raises(InputError, match=text):
         RunOptions(**given)
+    with pytest.raises(InputError, match=text):
+        pendmap.basins(BARE, 4, **given)
+
+
+def test_options_of_a_run_may_be_given_by_name() -> None:
+    by_name = pendmap.basins(BARE, 8, run=RunOptions(seed=2), threads=1)
+    assert (by_name.attrs["seed"], by_name.attrs["threads"]) == (2, 1)
+    same = pendmap.basins(BARE, 8, run=RunOptions(threads=1, seed=2))
+    assert by_name.drop_attrs().equals(same.drop_attrs())
+    with pytest.raises(TypeError, match="speed"):
+        pendmap.basins(BARE, 4, speed=2)  # type: ignore[call-arg]
 
 
 @pytest.mark.parametrize("name", RESULTS)
