@@ -79,9 +79,10 @@ impl Attractor {
         let period = orbit.n as f64 * pendulum.period();
         let kind = classify(pendulum, orbit);
         Self {
-            points: match kind.is_rest() {
-                true => vec![[balanced(orbit.points[0][0]), 0.0]],
-                false => orbit.points.clone(),
+            points: if kind.is_rest() {
+                vec![[balanced(orbit.points[0][0]), 0.0]]
+            } else {
+                orbit.points.clone()
             },
             multipliers: orbit.multipliers.0.to_vec(),
             exponent: orbit.multipliers.exponent(period),

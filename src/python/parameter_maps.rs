@@ -145,9 +145,8 @@ fn kinds_of<'a>(
     all: impl Iterator<Item = &'a Attractor>,
     pairs: bool,
 ) -> (Vec<Attractor>, Vec<i16>) {
-    let key = |a: &Attractor| match pairs {
-        true => (a.kind, a.n, a.w.abs(), 0, 0),
-        false => (a.kind, a.n, a.w, a.lean, a.turn),
+    let key = |a: &Attractor| {
+        if pairs { (a.kind, a.n, a.w.abs(), 0, 0) } else { (a.kind, a.n, a.w, a.lean, a.turn) }
     };
     let keys: Vec<_> = all.map(key).collect();
     let every: BTreeSet<_> = keys.iter().copied().collect();
