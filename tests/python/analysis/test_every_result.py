@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib
 import inspect
 import json
@@ -12,6 +13,7 @@ import pytest
 
 import pendmap
 from pendmap import Effect, Formula, Grid, InputError, Pendulum, Rig, RunOptions, render, viewer
+from pendmap.analysis.run import Keywords
 from pendmap.files import facts
 
 if TYPE_CHECKING:
@@ -143,6 +145,7 @@ def test_options_of_runs_are_checked(given: dict[str, Any], text: str) -> None:
 
 
 def test_options_of_a_run_may_be_given_by_name() -> None:
+    assert [*Keywords.__annotations__] == [one.name for one in dataclasses.fields(RunOptions)]
     by_name = pendmap.basins(BARE, 8, run=RunOptions(seed=2), threads=1)
     assert (by_name.attrs["seed"], by_name.attrs["threads"]) == (2, 1)
     same = pendmap.basins(BARE, 8, run=RunOptions(threads=1, seed=2))
