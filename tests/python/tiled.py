@@ -72,7 +72,7 @@ def begun(analysis: Callable[..., Any], store: Path | str, share: float = 0.5, *
         # The search for attractors reports its progress too.
         if done > share * total and system.exists(folder):
             system.invalidate_cache()
-            if any(name.rsplit("/", 1)[-1].isdecimal() for name in system.find(f"{folder}/work")):
+            if any(name.rsplit("/", 1)[-1].isdecimal() for name in system.find(folder)):
                 raise StoppedError
 
     with pytest.raises(StoppedError):

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import concurrent.futures
 import contextlib
 import dataclasses
 import importlib
 import inspect
-from typing import TYPE_CHECKING, Any
+import logging
+import multiprocessing
+import os
+import signal
+import threading
+from typing import TYPE_CHECKING, Any, Final
 
 from pendmap import ANALYSES
 from pendmap.cli.parse.groups import group, new_command
@@ -16,6 +22,7 @@ from pendmap.cli.parse.signature import options_of, parameters
 from pendmap.cli.parse.types import Address
 from pendmap.cli.show import begin, made_here, show
 from pendmap.cli.text import say
+from pendmap.errors import MOST_WORKERS, InputError, check_whole, named, short_repr
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -24,6 +31,7 @@ if TYPE_CHECKING:
 
     from pendmap.cli.parse.options import Decorator
 
+_ANSWER: Final = 10  # Time in which a scheduler must answer, s
 WRITES = """
 
 Writes {0}.nc, {0}.png and {0}.rrd if no output is named."""
@@ -92,13 +100,44 @@ def analysis_command(
 
 @contextlib.contextmanager
 def _workers(count: int | None, scheduler: str | None, *, quiet: bool) -> Iterator[Any]:
-    """Yield the executor of --workers or --scheduler, or None; say if there are no workers."""
-    if scheduler is None and count is None:
+    """Yield processes for --workers, a Dask client for --scheduler, or None; say what lacks."""
+    if scheduler is not None and count is not None:
+        raise InputError("only one of scheduler and workers must be given, got both")
+    if scheduler is not None:
+        with named(f"scheduler {short_repr(scheduler)}"), _client(scheduler) as client:
+            if not quiet and not client.nthreads():
+                say(f"{scheduler} has no workers yet: waiting for them.", err=True)
+            yield client
+    elif count is not None:
+        fresh = multiprocessing.get_context("spawn")
+        count = check_whole("workers", count, 1, MOST_WORKERS)
+        with concurrent.futures.ProcessPoolExecutor(count, fresh, _begin_worker) as pool:
+            yield pool
+    else:
         yield None
-        return
-    from pendmap.engine import executor_of
 
-    with executor_of(scheduler, count) as executor:
-        if not quiet and not executor.nthreads():
-            say(f"{scheduler} has no workers yet: waiting for them.", err=True)
-        yield executor
+
+def _client(scheduler: str) -> Any:  # noqa: ANN401 (of Dask)
+    """Return a client of a scheduler; InputError if it does not answer within seconds."""
+    logging.disable()  # Dask would fill many lines when workers end
+    try:
+        import distributed
+
+        return distributed.Client(scheduler, timeout=_ANSWER, set_as_default=False)
+    except ImportError:
+        raise InputError("must be left out without the extra pendmap[dask]") from None
+    except Exception as error:
+        raise InputError(f"is not reached: {error}") from error
+
+
+def _begin_worker() -> None:
+    """Leave Ctrl-C to the process that drives, and end with it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)

@@ -55,13 +55,6 @@ def test_a_file_has_no_bar() -> None:
     assert run.stderr == ""
 
 
-@pytest.mark.skipif(not hasattr(os, "openpty"), reason="this system has no such terminals")
-def test_the_time_passes_while_nothing_is_reported() -> None:
-    code = "bar = pendmap.ProgressBar()\nbar(1, 9)\ntime.sleep(3.5)\nbar.close()"
-    said = in_terminal(f"import pendmap, time\n{code}")
-    assert len(set(re.findall(r"(\d\d:\d\d) passed", said))) >= 3
-
-
 def test_progress_in_rounds_rises_with_each_and_never_falls() -> None:
     seen: list[float] = []
     report = in_rounds(lambda done, total: seen.append(done / total), 4)

@@ -67,9 +67,9 @@ def _touched(path: Path) -> Path:
 
 
 def test_a_later_format_is_refused(tmp_path: Path, results: list[xr.Dataset]) -> None:
-    later = results[3].assign_attrs(format_version=3)
+    later = results[3].assign_attrs(format_version=4)
     pendmap.save(later, tmp_path / "later.nc")
-    with pytest.raises(InputError, match="has format 3"):
+    with pytest.raises(InputError, match="has format 4, this pendmap reads format 3"):
         pendmap.load(tmp_path / "later.nc")
 
 
