@@ -98,7 +98,7 @@ def stopped(fault: str, at: int, store: str, count: list[int]) -> None:
 
     def hook(event: str, words: tuple[Any, ...]) -> None:
         writes = {"open", "os.rename", "os.remove", "os.rmdir", "os.mkdir"}
-        if event not in writes or store not in str(words[0]):
+        if event not in writes or os.path.basename(store) not in str(words[0]):  # noqa: PTH119
             return
         if event == "open" and not words[2] & os.O_CREAT:
             return

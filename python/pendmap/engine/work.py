@@ -120,7 +120,13 @@ class FileStore(Store):
     def begin(self, request: dict[str, Any], *, resume: bool) -> xr.Dataset | None:
         """Begin a run or go on with one; return its result if it is complete."""
         self._request = request
+        seal = dataset.sealed(self.address) if resume else None
         stored = self.get(_REQUEST)
+        if seal is not None and (stored is None or seal[_REQUEST] == request):
+            self._check(seal[_REQUEST] or {})
+            result: xr.Dataset = dataset.load(self.address)
+            self._clear()
+            return result
         if stored is not None and not resume:
             goes_on = "is an unfinished run: --resume (resume=True) goes on with it"
             raise InputError(f"{self.unfinished}: {goes_on}; a new run must have another name")
@@ -128,10 +134,6 @@ class FileStore(Store):
             self._check(json.loads(stored))
         elif {*self.records} - {_REQUEST}:
             raise InputError(f"{self.unfinished}: is no run, or is damaged: it must be removed")
-        elif resume and (seal := dataset.sealed(self.address)):
-            self._check(seal[_REQUEST] or {})
-            result: xr.Dataset = dataset.load(self.address)
-            return result
         else:
             dataset.check_replaceable(self.address)
             self._begun = False
@@ -167,8 +169,13 @@ class FileStore(Store):
         if dataset.is_local(self.address):
             dataset.check_replaceable(self.address)
         dataset.write_store(result, self.address, self._request)
-        self._system.rm(f"{self._path}.part/records", recursive=True)
-        with contextlib.suppress(OSError):  # other files are left alone
+        self._clear()
+
+    def _clear(self) -> None:
+        """Remove the records; other files are left alone."""
+        if self._system.exists(f"{self._path}.part/records"):
+            self._system.rm(f"{self._path}.part/records", recursive=True)
+        with contextlib.suppress(OSError):
             self._system.rmdir(f"{self._path}.part")
 
 

@@ -286,8 +286,8 @@ def _check_whole(address: Address) -> None:
     stored = sealed(address)
     if stored is None:
         unfinished = system.exists(f"{path}.part")
-        text = _UNFINISHED if unfinished else f"must be a result of pendmap, it lacks {_SEAL}"
-        raise InputError(f"{address}: {text}")
+        lacks = f"must be a result of pendmap in format {FORMAT_VERSION}, it lacks {_SEAL}"
+        raise InputError(f"{address}: {_UNFINISHED if unfinished else lacks}")
     files: dict[str, str] = stored["files"]
     for key in files if is_local(address) else ():
         with contextlib.suppress(FileNotFoundError):

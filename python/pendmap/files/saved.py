@@ -19,7 +19,7 @@ import xarray as xr
 
 from pendmap import _core
 from pendmap.errors import InputError, short_repr
-from pendmap.files.variables import CONVENTIONS, FORMAT_VERSION, flag, variable
+from pendmap.files.variables import CONVENTIONS, FORMAT_VERSION, NO_YES, variable
 from pendmap.formatting import Readable
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ _PACKAGE: Final = "pendmap."
 """Beginning of the modules whose classes a file may name."""
 _LEFT_OUT: Final = frozenset(("experiment", "data", "joint", "fit"))
 """Fields whose names are no part of the names of variables."""
-_PLAIN: Final = {"dict": dict, "list": list, "tuple": tuple, "Path": Path}
+_PLAIN: Final[dict[str, Any]] = {"dict": dict, "list": list, "tuple": tuple, "Path": Path}
 
 
 class Saved(Readable):
@@ -85,55 +85,48 @@ class Saved(Readable):
         return xr.Dataset(data, attrs=attributes)
 
 
-@dataclasses.dataclass
 class _Packed:
     """Parts of a result as JSON, and their arrays by the names of variables."""
 
-    table: Mapping[str, About]
-    """What arrays become variables, by ``Class.field``."""
-    parts: dict[str, list[tuple[str, NDArray[Any]]]] = dataclasses.field(default_factory=dict)
-    """Arrays of each variable, each with the name of its run."""
-    about: dict[str, tuple[str, str, str]] = dataclasses.field(default_factory=dict)
-    seen: dict[int, Any] = dataclasses.field(default_factory=dict)
-    """Number of each part by its id, with the part, so that no id is used twice."""
+    def __init__(self, table: Mapping[str, About]) -> None:
+        self._table = table  # what arrays become variables, by ``Class.field``
+        self._arrays: dict[str, list[tuple[str, NDArray[Any]]]] = {}  # each with its run's name
+        self._about: dict[str, tuple[str, str, str]] = {}
+        self._seen: dict[int, Any] = {}  # parts with their numbers, so that no id is used twice
 
     def plain(  # noqa: C901 (a branch a type)
-        self,
-        value: Any,
-        path: tuple[str, ...] = (),
-        label: str = "",
-        about: About | None = None,
+        self, value: Any, path: tuple[str, ...] = (), label: str = "", about: About | None = None
     ) -> Any:
         """Return a value for JSON; ``path`` are the names of its fields, ``label`` of its run."""
         if isinstance(value, np.generic):
             value = value.item()
         if value is None or isinstance(value, bool | int | float | str):
             return value
-        if isinstance(value, np.ndarray) and value.dtype.kind in "biufU":
+        if isinstance(value, np.ndarray):
             return self._array(value, path, label, about)
-        if isinstance(value, Path):
-            return {"is": "Path", "of": str(value)}
-        if id(value) in self.seen:
-            return {"is": "same", "of": self.seen[id(value)][0]}
-        place = len(self.seen)
-        self.seen[id(value)] = place, value
-        kind, of = type(value).__name__, []
+        if id(value) in self._seen:
+            return {"is": "same", "of": self._seen[id(value)][0]}
+        place = len(self._seen)
+        self._seen[id(value)] = place, value
+        of: Any = []
         if isinstance(value, Mapping):
+            kind = "dict"
             for key, part in value.items():
                 inner = (*path, str(key)) if about else path
                 of.append([self.plain(key), self.plain(part, inner, str(key), about)])
-            kind = "dict"
         elif isinstance(value, list | tuple):
             kind = "list" if isinstance(value, list) else "tuple"
             for k, part in enumerate(value):
                 name = getattr(part, "name", getattr(getattr(part, "run", None), "name", None))
                 item = name if isinstance(name, str) else f"{label} {k}".strip()
                 of.append(self.plain(part, path, item, about))
+        elif isinstance(value, Path):
+            kind, of = "Path", str(value)
         elif dataclasses.is_dataclass(value) and type(value).__module__.startswith(_PACKAGE):
-            for name, part in vars(value).items():
-                described = self.table.get(f"{kind}.{name}")
-                of.append([name, self.plain(part, (*path, name), label, described)])
             kind = f"{type(value).__module__}:{type(value).__qualname__}"
+            for name, part in vars(value).items():
+                described = self._table.get(f"{type(value).__name__}.{name}")
+                of.append([name, self.plain(part, (*path, name), label, described)])
         else:
             raise InputError(f"a result with {short_repr(value)} cannot be saved")
         return {"is": kind, "of": of, "at": place}
@@ -150,8 +143,8 @@ class _Packed:
         if not isinstance(about, tuple) or not value.size:
             return {**node, "of": value.ravel().tolist()}
         name = "_".join(part for part in path if part not in _LEFT_OUT)
-        self.about[name] = about
-        parts = self.parts.setdefault(name, [])
+        self._about[name] = about
+        parts = self._arrays.setdefault(name, [])
         begin = sum(part.shape[-1] for _, part in parts)
         parts.append((label, value))
         return {**node, "of": name, "from": begin}
@@ -160,17 +153,18 @@ class _Packed:
         """Return the variables by name, and for those of several runs what tells them apart."""
         made: dict[str, Any] = {}
         dims: dict[tuple[str, tuple[int, ...]], str] = {}
-        for name, parts in self.parts.items():
-            over, units, meaning = self.about[name]
+        for name, parts in self._arrays.items():
+            over, units, meaning = self._about[name]
             values = np.concatenate([part for _, part in parts], axis=-1)
             lengths = [*((n,) for n in values.shape[:-1]), tuple(p.shape[-1] for _, p in parts)]
             names: tuple[str, ...] = ()
             for key in zip(over.split(), lengths, strict=True):
                 other = f"{name}_{key[0]}" if key[0] in dims.values() else key[0]
                 names += (dims.setdefault(key, other),)
-            made[name] = variable(names, values, units, meaning)
-            if values.dtype.kind == "b":
-                made[name] = flag(names, values, meaning)
+            truth = values.dtype.kind == "b"
+            flags = NO_YES if truth else None
+            values = values.astype(np.int8) if truth else values
+            made[name] = variable(names, values, units, meaning, flags=flags)
             if len(parts) > 1:
                 labels = {k: label for k, (label, _) in enumerate(parts)}
                 owner = np.repeat(np.arange(len(parts), dtype=np.int16), lengths[-1])
@@ -197,9 +191,8 @@ def unpacked(content: str, arrays: Mapping[str, NDArray[Any]]) -> Any:
                 of = arrays[of][..., node["from"] : node["from"] + node["shape"][-1]]
             values = np.asarray(of).astype(node["dtype"])
             return np.ascontiguousarray(values.reshape(node["shape"]))
-        value = _PLAIN[kind](made(of)) if kind in _PLAIN else _instance(kind, dict(made(of)))
-        if "at" in node:
-            seen[node["at"]] = value
+        of = made(of)
+        value = seen[node["at"]] = _PLAIN[kind](of) if kind in _PLAIN else _instance(kind, dict(of))
         return value
 
     return made(json.loads(content))
@@ -211,8 +204,7 @@ def _instance(name: str, state: dict[str, Any]) -> Any:
     if not module.startswith(_PACKAGE):
         raise InputError(f"{short_repr(name)} is no class of pendmap")
     kind = getattr(importlib.import_module(module), short)
-    lacking = {field.name for field in dataclasses.fields(kind)} - state.keys()
-    if lacking:
+    if lacking := {field.name for field in dataclasses.fields(kind)} - state.keys():
         lacks = ", ".join(sorted(lacking))
         raise InputError(f"{short} lacks {lacks}: another version of pendmap wrote it")
     value = object.__new__(kind)

@@ -79,7 +79,9 @@ def test_a_store_of_zarr_2_runs_no_code(tmp_path: Path, pendmap_command: Run) ->
     (store / "label" / ".zarray").write_text(json.dumps(array | more))
     (store / "label" / ".zattrs").write_text('{"_ARRAY_DIMENSIONS": ["theta"]}')
     (store / "label" / "0").write_bytes(pickle.dumps(Touch(tmp_path / "run")))
-    with pytest.raises(InputError, match=r"must be a result of pendmap, it lacks pendmap\.json"):
+    with pytest.raises(
+        InputError, match=r"must be a result of pendmap in format 3, it lacks pendmap\.json"
+    ):
         pendmap.load(store)
     plotted = pendmap_command("plot", "a.zarr")
     assert plotted.returncode == 2
