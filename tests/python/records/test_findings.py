@@ -7,7 +7,7 @@ import string
 from pathlib import Path
 
 import pendmap
-from pendmap.records.findings import texts
+from pendmap.records.experiment import texts
 
 PACKAGE = Path(pendmap.__file__).parent / "records"
 GIVEN = {"finding": set(), "finding_of": set(), "leave_out": {"number"}, "distrust": {"number"}}
