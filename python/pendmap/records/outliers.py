@@ -2,7 +2,7 @@
 
 A push changes the velocity of a pendulum, but its angle is continuous: a jump that persists is an
 error of the sensor, one that returns an outlier. A jump makes one difference between samples wrong,
-an outlier two. Samples at an end of a record or a gap are predicted from those further inside.
+an outlier two. Samples at an end of a record or a gap are judged by a cubic.
 """
 
 from __future__ import annotations
@@ -35,6 +35,7 @@ SCALE_SAMPLES: Final = 151  # Samples from which the local standard deviation is
 PASSES: Final = 8  # Most searches for outliers; each may reveal one next to another
 MOST_OUTLIERS: Final = 0.1  # Greatest share of outliers; with more, no sample is marked
 SIDE: Final = 10  # Samples on each side from which a sample is judged
+GAP: Final = 4.0  # Gap, intervals, that windows do not cross
 MOST_TOGETHER: Final = 6  # Most neighbouring outliers that are distinguished from the motion
 WEIGHT_STEPS: Final = 10  # Iterations of the weights of least absolute deviations
 CERTAIN_JUMP: Final = 7.0  # Standard errors above which a step is a jump
@@ -69,8 +70,8 @@ def outliers(work: Work) -> Finding | None:
                 jumps.append(jump)
                 theta[jump.at :] -= jump.size
         _bridge(work.time, theta, false)
-    for end in (slice(0, 2 * SIDE), slice(-2 * SIDE, None)):  # the windows end before them
-        away = np.abs(_smooth(work.time[end] - work.time[end][0], theta[end]))
+    for end in _ends(work.time):  # windows end before them
+        away = np.abs(_smooth(work.time[end] - work.time[end[0]], theta[end]))
         false[end] |= ~corner[end] & (away > SUSPECT * normal_scale(away) + 2 * work.count)
     _bridge(work.time, theta, false)
     work.jumps = sorted(jumps, key=lambda jump: jump.at)
@@ -79,6 +80,14 @@ def outliers(work: Work) -> Finding | None:
         moved[jump.at :] += jump.size
     work.bridged = theta + moved
     return _distrust(work, np.flatnonzero(false & work.trusted), work.theta - moved - theta, "rad")
+
+
+def _ends(time: Floats) -> list[Indices]:
+    """Return the samples at the ends of a record and of its gaps."""
+    steps = np.diff(time)
+    pieces = np.split(np.arange(time.size), np.flatnonzero(steps > GAP * np.median(steps)) + 1)
+    long = [piece for piece in pieces if piece.size >= 2 * SIDE]
+    return [end for piece in long for end in (piece[: 2 * SIDE], piece[-2 * SIDE :])]
 
 
 def _distrust(work: Work, at: Indices, away: Floats, unit: str) -> Finding | None:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 RELEASE_RISE: Final = 0.1  # Relative growth of a swing that only a hand causes
 LONG_HALF: Final = 1.4  # Duration of a half cycle, over the usual one, that only a hand causes
+GAP: Final = 4.0  # Intervals without a reading that make the duration of a half cycle uncertain
 HELD_LONGER: Final = 1.5  # Delay, over that of a release from rest, above which there is a hold
 NEAR_UPRIGHT: Final = 0.05  # Sine of an angle below which a release is too slow to detect
 FEWEST_HALF_CYCLES: Final = 5  # Fewest half cycles of a release that is a run, about three swings
@@ -78,11 +79,10 @@ def grown(work: Work, part: Stretch) -> list[Stretch]:
     late = np.max(np.abs(theta[time > half.crossing[-1]]), initial=0.0)
     size, crossing = np.append(np.abs(half.peak), late), np.append(half.crossing, time[-1])
     places = np.searchsorted(work.time, crossing)
-    lasts, number = np.diff(half.crossing), np.diff(np.searchsorted(time, half.crossing))
-    usual = median_filter(number, 5, mode="nearest")  # readings: gaps of a record are no holds
-    long = (lasts > LONG_HALF * median_filter(lasts, 5, mode="nearest")) & (
-        number > LONG_HALF * usual
-    )
+    lasts, steps = np.diff(half.crossing), np.diff(time)
+    cut = np.maximum(np.searchsorted(time, half.crossing[:-1]) - 1, 0)
+    whole = np.maximum.reduceat(steps, cut) < GAP * np.median(steps)
+    long = whole & (lasts > LONG_HALF * median_filter(lasts, 5, mode="nearest"))
     # The half cycle before may be that of the hand, too.
     hands = [(places[max(k - 1, 0)], places[k + 1]) for k in np.flatnonzero(long)]
     before = np.abs(theta[time < crossing[0]])
@@ -90,12 +90,14 @@ def grown(work: Work, part: Stretch) -> list[Stretch]:
         hands.append((low, places[np.argmax(size)]))  # pushed from rest
     # Pairs of neighbours: an offset makes every other half cycle larger.
     pairs = np.maximum(size[:-1], size[1:])
+    # A single outlier raises two pairs.
+    lasting = np.minimum(pairs, np.append(pairs[2:], np.full(2, pairs[-1])))
     least, at = pairs[0], 0
     k = 1
     while k < pairs.size:
         if pairs[k] < least:
             least, at = pairs[k], k
-        elif pairs[k] > (1 + RELEASE_RISE) * least + 2 * work.limit:
+        elif lasting[k] > (1 + RELEASE_RISE) * least + 2 * work.limit:
             top = k
             while top + 1 < pairs.size and pairs[top + 1] > pairs[top] * 1.001:
                 top += 1

@@ -156,6 +156,7 @@ def angle_of_acceleration(
             )
         middle += float(np.median(half.middle))
     values, size = reading - middle, np.abs(half.peak[1:-1])
+    blind = size.max() < 2 * least and sensor.gravity
     low, high = np.quantile(reading, (0.02, 0.98)).tolist()
     sided = low * high > 0 or min(abs(low), abs(high)) < ONE_SIDED * max(abs(low), abs(high))
     if sided and sensor.direction != "angular":
@@ -171,11 +172,12 @@ def angle_of_acceleration(
         grown = 2 / math.pi * ellipk(np.sin(np.arcsin(share) / 2) ** 2)
         w0 = (w0 + 2 * math.pi * float(np.median((grown / half.period)[smaller]))) / 2
     sensor = dataclasses.replace(sensor, w0=w0)
-    if abs(sensor.distance_m * w0**2 / (sensor.gravity or math.inf) - 1) < BLIND_SPOT:
+    if blind or abs(sensor.distance_m * w0**2 / (sensor.gravity or math.inf) - 1) < BLIND_SPOT:
         raise InputError(
-            f"{where}: distance_m is {sensor.distance_m:g}, that of the centre of oscillation,"
-            " g/w0^2 from the pivot, where gravity and the swing cancel: only damping is"
-            " measured there; it must be another place on the rod, or an angle must be recorded too"
+            f"{where}: distance_m is {sensor.distance_m:g}, and the readings are hardly more than"
+            " noise, as at the centre of oscillation, g/w0^2 from the pivot, where gravity and the"
+            " swing cancel: only damping is measured there; it must be another place on the rod, or"
+            " an angle must be recorded too"
         )
     most, top = abs(sensor.gain), float(np.quantile(size, 0.8))
     if top > LARGEST_READING * most:

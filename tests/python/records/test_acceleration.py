@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,7 +33,7 @@ def said(run: Run) -> dict[str, str]:
     return {finding.what: finding.text for finding in run.findings}
 
 
-@pytest.mark.parametrize("release", [0.3, 1.4, 2.5])
+@pytest.mark.parametrize("release", [0.3, 1.4])
 def test_the_reconstructed_angle_is_near_the_true_one(tmp_path: Path, release: float) -> None:
     time, theta, force = readings(release=release)
     run = read(experiment(tmp_path, column(PLACE % 0.1), time, force))
@@ -54,11 +53,11 @@ def test_the_reconstructed_angle_is_near_the_true_one(tmp_path: Path, release: f
         ('direction = "radial", distance_m = 0.1', "cannot tell left from right"),
         (
             'direction = "up", distance_m = 0.1',
-            'must be one of "tangential", "radial", "angular", got',
+            'must be "tangential" or "radial" or "angular", got',
         ),
         (
             PLACE % -1,
-            "distance_m must be more than 0, up to 100, from the pivot to the sensor in m, got -1",
+            "distance_m must be 1e-06 to 100, got -1",
         ),
         (
             'direction = "tangential", distance_m = "near"',
@@ -107,28 +106,22 @@ def test_the_centre_of_oscillation_is_refused(tmp_path: Path) -> None:
     time, _, force = readings(distance=CENTRE)
     with pytest.raises(InputError, match="only damping is measured there"):
         read(experiment(tmp_path, column(PLACE % CENTRE), time, force))
-    near = 0.85 * CENTRE
-    time, _, force = readings(distance=near)
-    text = said(read(experiment(tmp_path, column(PLACE % near), time, force)))
-    assert "centre of oscillation" in text["acceleration-weak"]
-    # An error of 1 mm, over the remaining 38 mm.
-    percent = re.search(r"1 mm makes angles ([\d.]+) % wrong", text["acceleration-weak"])
-    assert percent is not None
-    assert float(percent[1]) == pytest.approx(0.1 / (CENTRE - near), rel=0.1)
 
 
-def test_a_signal_near_the_noise_is_reported(tmp_path: Path) -> None:
-    time, _, force = readings(release=0.05, friction=0.0, noise=0.03)
-    text = said(read(experiment(tmp_path, column(PLACE % 0.1), time, force)))
-    assert "times the noise" in text["acceleration-weak"]
-
-
-def test_turns_over_the_top_and_forced_runs_are_refused(tmp_path: Path) -> None:
-    time = np.arange(0, 30, 0.01)
-    theta = motion(time, (0.3, 20.0), w0=6.2, c_over_m=0.08, friction=0.1)
+@pytest.mark.parametrize("velocity", [0.0, 20.0])
+def test_swings_beyond_a_quarter_turn_are_not_used(tmp_path: Path, velocity: float) -> None:
+    time = np.arange(0, 40, 0.01)
+    theta = motion(time, (2.5, velocity), w0=6.2, c_over_m=0.08, friction=0.1)
     force = -np.gradient(np.gradient(theta, time), time)
-    with pytest.raises(InputError, match="over the top"):
-        read(experiment(tmp_path, '{ name = "acc", unit = "rad/s2" }', time, force))
+    run = read(experiment(tmp_path, '{ name = "acc", unit = "rad/s2" }', time, -force))
+    assert "used from" in said(run)["acceleration-folded"]
+    away = np.abs(theta - 2 * np.pi * np.round(theta[-1] / (2 * np.pi)))
+    assert away[run.trusted].max() < 1.3
+    assert run.trusted.mean() > 0.3
+    assert np.abs(np.abs(run.theta) - away)[run.trusted].max() < 0.1
+
+
+def test_forced_runs_are_refused(tmp_path: Path) -> None:
     time, _, force = readings()
     there = experiment(tmp_path, column(PLACE % 0.1), time, force)
     with (there / "experiment.toml").open("a", encoding="utf-8") as file:
