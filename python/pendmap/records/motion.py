@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from pendmap.signal import Stretch
 
 STILL_SPAN: Final = 8.0  # Range of readings below which there is no motion, over the noise
-FOLDED: Final = 0.9  # Reading over the gain, of an accelerometer, near a quarter turn
+FOLDED: Final = 0.97  # Reading over the gain, of an accelerometer, near a quarter turn
 NOISE_SPAN: Final = 0.1  # Range, rad, below which readings dominated by noise show no motion
 MOST_LISTED: Final = 6  # Most releases whose times are listed in a message
 CERTAIN_OFFSET: Final = 4.0  # Standard errors above which an offset is reported
@@ -84,10 +84,11 @@ def _folded_parts(work: Work, read: Work) -> Finding | None:
     """Begin each motion where an acceleration shows swings below a quarter turn."""
     begins = []
     for low, high in work.parts:
-        half = swings(read.time[low:high], read.theta[low:high] - read.middle, least=read.limit)
-        folded = np.flatnonzero(np.abs(half.peak) > FOLDED)
-        at = half.crossing[folded[-1] + 1] if folded.size else -math.inf
-        begins.append(max(low, int(np.searchsorted(work.time, at))))
+        time, theta = read.time[low:high], read.theta[low:high] - read.middle
+        crossing = swings(time, theta, least=read.limit).crossing
+        folded = time[np.abs(theta) > FOLDED]
+        after = crossing[crossing > folded[-1]] if folded.size else crossing[:0]
+        begins.append(int(np.searchsorted(work.time, after[0])) if after.size else low)
     late = [begin for (low, _), begin in zip(work.parts, begins, strict=True) if begin > low]
     ends = [high for _, high in work.parts]
     work.parts = [(a, b) for a, b in zip(begins, ends, strict=True) if b - a > 5]

@@ -87,7 +87,7 @@ def grown(work: Work, part: Stretch) -> list[Stretch]:
     hands = [(places[max(k - 1, 0)], places[k + 1]) for k in np.flatnonzero(long)]
     before = np.abs(theta[time < crossing[0]])
     if np.argmax(before) and (1 + RELEASE_RISE) * before.max() + 2 * work.limit < size[1]:
-        hands.append((low, places[np.argmax(size)]))  # pushed from rest
+        hands.append((low, places[np.argmax(size) + 1]))  # pushed from rest
     # Pairs of neighbours: an offset makes every other half cycle larger.
     pairs = np.maximum(size[:-1], size[1:])
     # A single outlier raises two pairs.
