@@ -80,9 +80,9 @@ def grown(work: Work, part: Stretch) -> list[Stretch]:
     size, crossing = np.append(np.abs(half.peak), late), np.append(half.crossing, time[-1])
     places = np.searchsorted(work.time, crossing)
     lasts, steps = np.diff(half.crossing), np.diff(time)
-    cut = np.maximum(np.searchsorted(time, half.crossing[:-1]) - 1, 0)
-    whole = np.maximum.reduceat(steps, cut) < GAP * np.median(steps)
-    long = whole & (lasts > LONG_HALF * median_filter(lasts, 5, mode="nearest"))
+    long = lasts > LONG_HALF * median_filter(lasts, 5, mode="nearest")
+    for k in np.flatnonzero(steps > GAP * np.median(steps)):
+        long &= (half.crossing[1:] < time[k]) | (half.crossing[:-1] > time[k + 1])
     # The half cycle before may be that of the hand, too.
     hands = [(places[max(k - 1, 0)], places[k + 1]) for k in np.flatnonzero(long)]
     before = np.abs(theta[time < crossing[0]])

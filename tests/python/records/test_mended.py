@@ -28,7 +28,6 @@ MENDED = {
     "nanoseconds": ((1e9 * TIME, THETA), NAMES, "time-unit"),
     "rows in any order": ((TIME[ORDER], THETA[ORDER]), NAMES, "time-backwards"),
     "rows reversed": ((TIME[::-1], THETA[::-1]), NAMES, "time-backwards"),
-    "a counter overflows": (((TIME + 55) % 65.536, THETA), NAMES, "time-wrapped"),
     "degrees": ((TIME, THETA / DEGREE), NAMES, "angle-unit"),
     "a gauge at -90 degrees": ((TIME, THETA - TURN / 4), NAMES, "gauge-turned"),
     "a gauge at 90 degrees": ((TIME, THETA + TURN / 4), NAMES, "gauge-turned"),
