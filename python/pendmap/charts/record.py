@@ -172,17 +172,16 @@ def _residuals(run: Run) -> Panel:
         return Panel("last", title, none, none, [Text(0.5, 0.5, "too few samples")])
     some = slice(None, None, max(speed.size // MOST_POINTS, 1))
     marks: list[Mark] = [Points(speed[some], residual[some], colour="#a9b8cc", size=0.8)]
-    for part in noise.by_speed:
-        ends = np.array([part.speed_from, min(part.speed_to, float(speed.max()))])
-        level = np.full(2, 1e3 * part.sigma)
-        marks.append(Line(ends, level, colour=FALSE, width=1.8, name="standard deviation"))
-    top = max(4.5e3 * noise.sigma, 1e3 * max((p.sigma for p in noise.by_speed), default=0.0) * 1.5)
+    reach = np.linspace(0.0, float(speed.max()), 50)
+    law = noise.law
+    sigma = np.full(50, noise.sigma) if law is None else np.hypot(law.still, law.tau * reach)
+    marks.append(Line(reach, 1e3 * sigma, colour=FALSE, width=1.8, name="standard deviation"))
+    top = 1e3 * max(4.5 * noise.sigma, 1.5 * float(sigma.max()))
     # An angle changes with the velocity, a rate with the acceleration.
     speeds = "|dθ/dt| (rad/s)"
     if run.gyroscope is not None:
         speeds = "|d²θ/dt²| (rad/s²)"
-    fastest = max((part.speed_to for part in noise.by_speed), default=float(speed.max()))
-    across = Axis(speeds, (0.0, max(fastest * 1.03, 1e-9)))
+    across = Axis(speeds, (0.0, max(float(reach[-1]) * 1.03, 1e-9)))
     up = Axis(f"residual (m{noise_unit(run)})", (0.0, max(top, 1e-9)))
     return Panel("last", title, across, up, marks)
 
