@@ -11,17 +11,15 @@ import numpy as np
 from scipy.special import ellipk
 
 from pendmap.errors import InputError
-from pendmap.identification.coarse_finder import coarse_finder, is_coarse
 from pendmap.identification.peak_finder import Finder
-from pendmap.identification.readings import reading_of
-from pendmap.identification.turning import outline
+from pendmap.identification.readings import FEWEST_A_PERIOD, reading_of
+from pendmap.identification.turning import outline, samples_per_period
 from pendmap.records.samples import measured
 from pendmap.signal.robust import from_first
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from pendmap.identification.coarse_finder import CoarseFinder
     from pendmap.identification.turning import End
     from pendmap.signal import Floats, Mask
 
@@ -51,6 +49,8 @@ class Peaks:
         Number of the half cycle of each crossing.
     sigma : float
         Standard deviation of a sample's noise from which errors are computed, rad.
+    lacking : str
+        Reason why peaks cannot be found in a record; empty otherwise.
     """
 
     time: Floats
@@ -65,6 +65,7 @@ class Peaks:
         default_factory=lambda: np.empty(0, np.int64)
     )
     sigma: float = 0.0
+    lacking: str = ""
 
     @classmethod
     def of(
@@ -155,11 +156,6 @@ def find_peaks(
     and a fifth of it is added to the error. The mean excess of the maximum of a noisy curve,
     ``stderr(v)^2 / (2 abs(theta''))``, is subtracted from amplitudes.
 
-    With fewer than 20 samples per period of small swings, solutions of ``th'' + c_over_m th' + Tr
-    sgn(th') + w0^2 sin(th - zero) = 0`` are fitted to the samples within half a swing, with
-    parameters shared by 12 consecutive turns. Errors include the noise, the errors of these
-    parameters, and the misfit of the model.
-
     Parameters
     ----------
     time, theta : array, shape (N,)
@@ -172,7 +168,7 @@ def find_peaks(
     Returns
     -------
     Peaks
-        Empty if the record does not swing.
+        Empty if the record does not swing, or has fewer than 20 samples per period of small swings.
 
     Raises
     ------
@@ -190,28 +186,25 @@ def find_peaks(
     drawn = measured(t, x)
     if drawn is not None:
         t, x = t[drawn.places], x[drawn.places]
-    finder, noise = _finder(t, x, sigma)
-    if finder is None:
-        return dataclasses.replace(Peaks.of((), ()), sigma=noise)
+    reading = reading_of(t, x, sigma)
+    none = dataclasses.replace(Peaks.of((), ()), sigma=reading.sigma)
+    count = samples_per_period(t, x)
+    if count < FEWEST_A_PERIOD:
+        few = f"{count:.3g} samples a period, {FEWEST_A_PERIOD:.3g} are needed for peaks"
+        return dataclasses.replace(none, lacking=few)
+    course = outline(t, x, reading.sigma)
+    if course is None:
+        return none
+    finder = Finder(t, x, reading, course)
     ends = finder.ends
     index = _numbered(ends, finder.w0)
     columns = np.array([(e.time, e.angle, e.stderr_time, e.stderr_angle) for e in ends])
     instant, angle, stderr_time, stderr_angle = columns.reshape(-1, 4).T.copy()
     kind, crossings = tuple(e.kind for e in ends), finder.crossings(index)
-    peaks = Peaks(instant, angle, stderr_time, stderr_angle, index, kind, *crossings, sigma=noise)
+    peaks = Peaks(
+        instant, angle, stderr_time, stderr_angle, index, kind, *crossings, sigma=reading.sigma
+    )
     return peaks.later(first)
-
-
-def _finder(
-    time: Floats, theta: Floats, sigma: float | None
-) -> tuple[Finder | CoarseFinder | None, float]:
-    """Return the finder for the sampling rate, None without swings; and the noise."""
-    if is_coarse(time, theta):
-        coarse = coarse_finder(time, theta, sigma)
-        return (None if coarse.course is None else coarse), coarse.sigma
-    reading = reading_of(time, theta, sigma)
-    course = outline(time, theta, reading.sigma)
-    return (None if course is None else Finder(time, theta, reading, course)), reading.sigma
 
 
 def _numbered(ends: list[End], w0: float) -> NDArray[np.int64]:

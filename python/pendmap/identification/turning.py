@@ -11,8 +11,9 @@ from scipy.ndimage import median_filter
 from scipy.optimize import minimize_scalar, nnls
 from scipy.special import ellipe, ellipk
 
+from pendmap.errors import InputError
 from pendmap.records.resolution import step_of
-from pendmap.signal.half_cycles import swings
+from pendmap.signal.half_cycles import after_turns, swings
 from pendmap.signal.local_polynomial import fit_around
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ def outline(time: Floats, theta: Floats, sigma: float) -> Outline | None:
     span = float(np.ptp(calm))
     steps = np.diff(time)
     gaps = np.flatnonzero(steps > _GAP * float(np.median(steps))) + 1
-    rough = zigzags(calm, max(8 * sigma + 2 * step, 1e-6 * span), gaps)
+    rough = _zigzags(calm, max(8 * sigma + 2 * step, 1e-6 * span), gaps)
     if rough.size < 2:  # noqa: PLR2004 (a half cycle lies between two)
         return None
     halves = np.diff(time[rough])
@@ -60,7 +61,7 @@ def outline(time: Floats, theta: Floats, sigma: float) -> Outline | None:
     gaps = np.flatnonzero(steps > _SMOOTHING * period) + 1
     # Near the end the mean has fewer samples: its turns there are noise.
     ahead = int(np.searchsorted(time, time[-1] - _SMOOTHING * period))
-    turns = zigzags(smooth[:ahead], _SURE * noise + 0.5 * step, gaps[gaps < ahead])
+    turns = _zigzags(smooth[:ahead], _SURE * noise + 0.5 * step, gaps[gaps < ahead])
     turns = _far_apart(turns, time, period)
     level = float(np.median(smooth[time > time[-1] - 0.5 * period]))
     off = np.flatnonzero(np.abs(smooth[:ahead] - level) > 4 * noise + 0.5 * step)
@@ -111,7 +112,7 @@ def _zigzag(x: Floats, threshold: float) -> Indices:
     return np.array(extremes, dtype=np.intp)
 
 
-def zigzags(x: Floats, threshold: float, gaps: Indices) -> Indices:
+def _zigzags(x: Floats, threshold: float, gaps: Indices) -> Indices:
     """Return the extremes of each part between gaps, without samples next to gaps."""
     begins = np.concatenate(([0], gaps))
     parts = [_zigzag(part, threshold) for part in np.split(x, gaps)]
@@ -261,6 +262,43 @@ FEWEST_SWINGS: Final = 2  # Fewest half swings from which starting values are es
 QUIET: Final = 10.0  # Greatest range of readings at rest, standard errors
 
 
+class TooShortError(InputError):
+    """Error raised for a record with too few decaying half swings for starting values."""
+
+
+def swinging(time: Floats, theta: Floats) -> tuple[Floats, Floats]:
+    """Return times and angles after any rotations, in the turn in which the pendulum rests."""
+    rest = math.tau * round(float(np.median(theta[-max(theta.size // 4, 1) :])) / math.tau)
+    first = after_turns(theta - rest)
+    return time[first:], theta[first:] - rest
+
+
+def samples_per_period(time: Floats, theta: Floats) -> float:
+    """Return the number of samples per period of small swings; infinite if no swing is seen."""
+    if theta.size < _FEWEST:
+        return math.inf
+    time, theta = swinging(time, theta)
+    w0 = _natural_frequency(time, theta)
+    if w0 is None:
+        return math.inf
+    # The median removes single spikes, but also fast swings, which lowers the frequency.
+    calm = _natural_frequency(time, median_filter(theta, 5, mode="nearest"))
+    if calm is not None and calm < 0.6 * w0:
+        return math.inf
+    return math.tau / (w0 * float(np.median(np.diff(time))))
+
+
+def _natural_frequency(time: Floats, theta: Floats) -> float | None:
+    """Return the natural frequency from the turning points of large swings, rad/s."""
+    if time.size < _FEWEST:
+        return None
+    turns = _zigzag(theta, 0.1 * float(np.ptp(theta)) + 1e-12)
+    if turns.size < 3:  # noqa: PLR2004 (two half swings)
+        return None
+    size = np.minimum(np.abs(np.diff(theta[turns])) / 2, 3.1)
+    return float(np.median(2 * ellipk(np.sin(size / 2) ** 2) / np.diff(time[turns])))
+
+
 def rough_start(time: Floats, theta: Floats, sigma: float) -> dict[str, float] | None:
     """Return starting values of ``w0``, ``c_over_m`` and ``Tr``; None with fewer than two swings.
 
@@ -269,6 +307,7 @@ def rough_start(time: Floats, theta: Floats, sigma: float) -> dict[str, float] |
     integral of the velocity over the angle) and ``2 A Tr``. Swings below four ``sigma`` are
     excluded.
     """
+    time, theta = swinging(time, theta)
     tail = theta[-max(len(theta) // 10, 1) :]
     # Only the mean of readings at rest is their centre.
     centre = float(np.mean(tail)) if np.ptp(tail) < QUIET * sigma else 0.0
