@@ -42,7 +42,7 @@ class Peaks:
     index : array of int, shape (P,)
         Number ``k`` of the peak; numbers are missing at gaps of the record.
     kind : tuple of str
-        ``release``, ``turn``, ``clipped``, or ``stop``, at which the pendulum comes to rest.
+        ``release``, ``turn`` or ``clipped``.
     crossing_time, crossing_stderr : array, shape (C,)
         Times of the crossings and their standard errors, s.
     crossing_index : array of int, shape (C,)
@@ -68,15 +68,8 @@ class Peaks:
     lacking: str = ""
 
     @classmethod
-    def of(
-        cls,
-        time: ArrayLike,
-        amplitude: ArrayLike,
-        *,
-        stderr_time: float = 0.0,
-        stderr_amplitude: float = 0.0,
-    ) -> Peaks:
-        """Return peaks from given times and amplitudes; absolute values get alternating signs."""
+    def of(cls, time: ArrayLike, amplitude: ArrayLike) -> Peaks:
+        """Return peaks of given times and amplitudes; absolute values get alternating signs."""
         t, a = np.asarray(time, float), np.asarray(amplitude, float)
         if t.ndim != 1 or t.shape != a.shape:
             raise InputError(
@@ -84,9 +77,8 @@ class Peaks:
             )
         if a.size > 1 and np.all(a[:-1] > 0):
             a = a * (-1.0) ** np.arange(a.size)
-        index = np.arange(t.size)
-        errors = np.full(t.size, stderr_time), np.full(t.size, stderr_amplitude)
-        return cls(t, a, *errors, index, ("turn",) * t.size)
+        none = np.zeros(t.size)
+        return cls(t, a, none, none, np.arange(t.size), ("turn",) * t.size)
 
     def __len__(self) -> int:
         return self.time.size
@@ -103,8 +95,8 @@ class Peaks:
 
     @property
     def turned(self) -> Peaks:
-        """Releases and turning points, without stops and clipped peaks."""
-        return self.select(np.array([kind in {"release", "turn"} for kind in self.kind], bool))
+        """Releases and turning points, without clipped peaks."""
+        return self.select(np.array([kind != "clipped" for kind in self.kind], bool))
 
     def later(self, seconds: float) -> Peaks:
         """Return the peaks with all times shifted by ``seconds``."""
@@ -214,7 +206,7 @@ def _numbered(ends: list[End], w0: float) -> NDArray[np.int64]:
         mean = min((abs(before.angle) + abs(after.angle)) / 2, 3.1)
         half = 2 * float(ellipk(math.sin(mean / 2) ** 2)) / w0
         cycles = (after.time - before.time) / half
-        odd = before.angle * after.angle < 0 or after.kind == "stop"
+        odd = before.angle * after.angle < 0
         steps = 2 * round((cycles - 1) / 2) + 1 if odd else 2 * round(cycles / 2)
         result.append(result[-1] + max(steps, 1))
     return np.array(result, np.int64)

@@ -1,4 +1,4 @@
-"""Approximate turning points of a record, its release and stop, and starting values of a fit."""
+"""Approximate turning points of a record, its release, and starting values of a fit."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from scipy.ndimage import median_filter
-from scipy.optimize import minimize_scalar, nnls
+from scipy.optimize import nnls
 from scipy.special import ellipe, ellipk
 
 from pendmap.errors import InputError
@@ -27,13 +27,11 @@ _GAP: Final = 10.0  # Shortest gap, sampling intervals, before the period is kno
 
 @dataclasses.dataclass(frozen=True)
 class Outline:
-    """Outline of a record of N samples: approximate turns, period and rest."""
+    """Outline of a record of N samples: approximate turns and period."""
 
     turns: Indices  # samples at turns of the smoothed angle, alternately maxima and minima
     period: float  # period of the late swings, s
     smooth: Floats  # running mean of the angle, rad, shape (N,)
-    noise: float  # standard error of smooth, rad
-    rest: int | None  # first sample of the final rest
     left: int  # first sample that is off the initial level
 
 
@@ -65,15 +63,14 @@ def outline(time: Floats, theta: Floats, sigma: float) -> Outline | None:
     turns = _far_apart(turns, time, period)
     level = float(np.median(smooth[time > time[-1] - 0.5 * period]))
     off = np.flatnonzero(np.abs(smooth[:ahead] - level) > 4 * noise + 0.5 * step)
-    rest = int(off[-1]) + 1 if off.size and time[-1] - time[off[-1]] > 0.75 * period else None
-    if rest is not None:
-        turns = turns[turns < rest]
+    if off.size and time[-1] - time[off[-1]] > 0.75 * period:
+        turns = turns[turns <= off[-1]]
     if turns.size < 2:  # noqa: PLR2004
         return None
     # Three consecutive samples are required: a single one is an outlier.
     away = np.abs(theta - float(np.median(theta[:3]))) > _SURE * sigma + step
     runs = away[:-2] & away[1:-1] & away[2:]
-    return Outline(turns, period, smooth, noise, rest, int(np.argmax(runs)))
+    return Outline(turns, period, smooth, int(np.argmax(runs)))
 
 
 def _running_mean(time: Floats, x: Floats, half: float) -> tuple[Floats, float]:
@@ -131,8 +128,7 @@ def _far_apart(turns: Indices, time: Floats, period: float) -> Indices:
 
 
 _RESOLVED: Final = 8.0  # Least difference between successive peaks, standard errors
-_SURE_END: Final = 4.0
-"""Standard errors above which a velocity at the release, or a displacement to the stop, is real."""
+_SURE_SPEED: Final = 4.0  # Standard errors above which a velocity at the release is real
 _LATENESS: Final = 5 / 32
 """Half the slope at 0 of the quartic fitted to ``s abs(s)``, over the window's half-width."""
 _DOUBT: Final = 0.2  # Fraction of the delay by friction that is added to the error
@@ -148,7 +144,7 @@ class End:
     angle: float  # rad
     stderr_time: float
     stderr_angle: float
-    kind: str  # release, turn, clipped or stop
+    kind: str  # release, turn or clipped
     window: float = 0.0  # half-width of the fitted window, s
 
     def resolved_from(self, before: End) -> bool:
@@ -177,11 +173,10 @@ class End:
 def release(
     time: Floats, theta: Floats, sigma: float, scale: tuple[float, float], course: Outline
 ) -> End | None:
-    """Return the release from rest at the beginning of a record; None if it begins in motion.
+    """Return the release from rest at the first sample; None if the record begins otherwise.
 
-    Either the first sample is the release (then the angle is even about it), or the pendulum was
-    held (then a constant angle is followed by a fall with continuous velocity). ``scale`` is the
-    approximate natural frequency, rad/s, and the half-width of a window, s.
+    The angle is even about a release. ``scale`` is the approximate natural frequency, rad/s, and
+    the half-width of a window, s.
     """
     if course.left == 0:
         return None
@@ -191,71 +186,17 @@ def release(
     bend = w0**2 * max(math.sin(min(abs(level), math.pi)), 0.02)
     quick = math.sqrt(2 * (6 * sigma + 1e-9) / bend)
     half = max(half, 5.5 * step)
-    if leaves - time[0] > 2 * quick + 4 * step:
-        return _joined(time, theta, sigma, (float(time[0]), leaves, half), "release")
     even = fit_around(time, theta, float(time[0]), half, (0, 2, 4), sigma=sigma)
     moving = fit_around(time, theta, float(time[0]), half, (0, 1, 2, 4), sigma=sigma)
-    if even is None or moving is None:
+    if leaves - time[0] > 2 * quick + 4 * step or even is None or moving is None:
         return None
     # With a velocity, or a curvature away from the middle, the record begins in motion.
     (angle, gain), (bend, _) = even.at(float(time[0])), even.at(float(time[0]), 2)
     speed, speed_gain = moving.at(float(time[0]), 1)
     slack = _STILL * abs(angle) * w0
-    if bend * angle >= 0 or abs(speed) > _SURE_END * speed_gain * sigma + slack:
+    if bend * angle >= 0 or abs(speed) > _SURE_SPEED * speed_gain * sigma + slack:
         return None
     return End(float(time[0]), angle, step / 10, gain * sigma, "release")
-
-
-def stop(
-    time: Floats, theta: Floats, sigma: float, course: Outline, before: list[End]
-) -> End | None:
-    """Return the stop in the half cycle after the last turn; None if it is not resolved."""
-    if course.rest is None or not before:
-        return None
-    last, rests = before[-1], float(time[course.rest])
-    if not 0.1 < (rests - last.time) / course.period < 0.9:  # noqa: PLR2004 (a half, roughly)
-        return None
-    half = 0.25 * course.period
-    end = _joined(time[::-1] * -1.0, theta[::-1], sigma, (-time[-1], -rests, half), "stop")
-    if end is None or abs(end.angle - last.angle) < _SURE_END * last.stderr_angle:
-        return None
-    return dataclasses.replace(end, time=-end.time)
-
-
-def _joined(
-    time: Floats, theta: Floats, sigma: float, where: tuple[float, float, float], kind: str
-) -> End | None:
-    """Fit a constant level followed by ``level + b s^2 + d s^4``, with the time s since its end.
-
-    ``where`` is the start of the level, its approximate end, and the length of the fit after it.
-    """
-    begin, leaves, half = where
-    use = (time >= begin) & (time <= leaves + half)
-    t, x = time[use], theta[use]
-    if t.size < 6:  # noqa: PLR2004 (parameters and two more)
-        return None
-
-    def solved(instant: float) -> tuple[float, Floats, Floats]:
-        s = np.maximum(t - instant, 0.0) / half
-        rows = np.column_stack((np.ones_like(s), s**2, s**4))
-        inverse = np.asarray(np.linalg.pinv(rows.T @ rows, hermitian=True), np.float64)
-        coefficients = inverse @ (rows.T @ x)
-        residual = x - rows @ coefficients
-        return float(residual @ residual), coefficients, inverse
-
-    # The sum of squares has flat parts and local minima: a scan precedes the search.
-    scan = np.linspace(max(leaves - half, begin), leaves + half / 2, 61)
-    nearest = int(np.argmin([solved(float(at))[0] for at in scan]))
-    low, high = float(scan[max(nearest - 1, 0)]), float(scan[min(nearest + 1, 60)])
-    best = minimize_scalar(lambda at: solved(at)[0], bounds=(low, high), method="bounded")
-    at = float(best.x)
-    least, coefficients, inverse = solved(at)
-    # The curvature of the sum of squares gives the error of the instant.
-    shift = max((high - low) / 10, 1e-9)
-    curvature = (solved(at + shift)[0] - 2 * least + solved(at - shift)[0]) / shift**2
-    error = sigma * math.sqrt(2 / curvature) if curvature > 0 else half
-    level_error = sigma * math.sqrt(max(float(inverse[0, 0]), 0.0))
-    return End(at, float(coefficients[0]), min(error, half), level_error, kind)
 
 
 FEWEST_SWINGS: Final = 2  # Fewest half swings from which starting values are estimated

@@ -10,9 +10,9 @@ import pytest
 from scipy.stats import norm
 
 from decays import decay, record
+from fits import joint_fit
 from pendmap import Rig
 from pendmap.identification.fit import TrajectoryFit, fit_runs
-from pendmap.identification.methods.trajectory import fit_decay
 from pendmap.identification.readings import reading_of
 from pendmap.identification.runs import FitRun
 from pendmap.model import Effect
@@ -71,9 +71,9 @@ def test_errors_of_intervals_are_below_those_of_values_and_match_the_scatter(
     noise: float, rate: float
 ) -> None:
     own, plain, z = [], [], []
-    for seed in range(12):
+    for seed in range(8):
         time, theta = coarse(256, noise, seed, rate=rate)
-        found = fit_decay(time, theta)
+        found = joint_fit(time, theta)
         fit, (reading,) = found.fit, found.readings
         assert reading.coarse
         assert fit.widening == 1
@@ -95,7 +95,7 @@ def test_samples_at_rest_on_one_count_add_no_information() -> None:
     errors = []
     for more in (0.5, 30.0):
         time, theta = record(made, seconds=rests + more, noise_deg=0.0, counts=360)
-        fit = fit_decay(time, theta).fit
+        fit = joint_fit(time, theta).fit
         errors.append(fit.estimates["encoder_offset.d"].stderr)
     assert errors[1] > 0.9 * errors[0]
 

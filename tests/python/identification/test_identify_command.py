@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 import re
 import signal
@@ -17,8 +16,6 @@ import pytest
 import pendmap
 from conftest import COMMAND
 from decays import decay, record
-from pendmap.formatting import estimate_text
-from pendmap.identification import Estimate
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -175,7 +172,6 @@ def test_no_model_is_written_where_the_search_did_not_converge(
             "bare.toml: has no dimensions, it must be a model in SI",
         ),
         (("compare", "model.toml", "idle"), "run_00: neither its drive nor its pivot is given"),
-        (("compare", "bare.toml", "decay.csv"), "in SI: in [pendulum] w0 in rad/s, c_over_m ="),
         (("compare", "model.png", "decay.csv", "--plot", "model.png"), "'model.png': is an input"),
         (("identify", "forced", "--out", "forced/experiment.toml"), "is an input, which would"),
         (("identify", "decay.toml", "--out", "decay.toml"), "'--out': 'decay.toml': is an input"),
@@ -232,20 +228,6 @@ def test_a_wrong_unit_is_reported_first(
     said = " ".join(run.stdout.split())
     assert re.match("Warning: run: [^:]*: the unit or the scale is wrong", said)
     assert said.count("the unit or the scale is wrong") == 1
-
-
-@pytest.mark.parametrize(
-    ("value", "error", "shown"),
-    [
-        (6.204711, 1.4e-5, "6.204711(14)"),
-        (-0.0275698, 5.5e-7, "-0.02756980(55)"),
-        (1.0, None, "1"),
-        (1234.5, 150.0, "1234.5 +- 1.5e+02"),
-        (0.5, math.inf, "0.5"),
-    ],
-)
-def test_numbers_with_their_errors(value: float, error: float | None, shown: str) -> None:
-    assert estimate_text(Estimate(value, error)) == shown
 
 
 def test_a_closed_pipe_is_no_failure(decay_file: Path, tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from pendmap.identification.methods.trajectory import identify
+from fits import trajectory_of
 from recorded import W0, found, motion, noisy, read, text
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ def test_a_fit_after_a_hold_has_residuals_of_noise_alone(
     tmp_path: Path, angle: float, hold: float
 ) -> None:
     run, _ = held(tmp_path, angle, hold, 0.1, 4)
-    fit = identify(run.time, run.theta, trusted=run.trusted)
+    fit = trajectory_of(run.time, run.theta, trusted=run.trusted)
     assert fit.misfit == pytest.approx(1.0, abs=0.15)
     assert not any("does not fit" in warning for warning in fit.warnings)
     w0 = fit.estimates["w0"]

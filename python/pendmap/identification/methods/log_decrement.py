@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -23,16 +23,15 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats
 
 
-Reading = Literal["ends", "line"]
 _FEWEST: Final = 3  # Fewest peaks below the cut
 
 
-def from_peaks(peaks: Peaks, *, reading: Reading = "ends", cut: float = CUT) -> Identification:
+def from_peaks(peaks: Peaks, *, cut: float = CUT) -> Identification:
     """Identify ``w0`` and ``c_over_m`` by the logarithmic decrement of peaks below ``cut`` (rad).
 
     ``delta = ln(abs(th_0) / abs(th_n)) / (n pi)`` over ``n`` half cycles between the first and the
-    last peak (the mean of all decrements is equal), or by ``reading="line"`` the slope of a line
-    through all ``ln abs(th_k)``; ``zeta = delta / sqrt(1 + delta^2)``, ``w0`` from the mean period.
+    last peak (the mean of all decrements is equal); ``zeta = delta / sqrt(1 + delta^2)``, ``w0``
+    from the mean period.
     Coulomb friction is attributed to viscous damping: the decrement increases as the swing decays.
     """
     small = peaks.turned
@@ -51,12 +50,7 @@ def from_peaks(peaks: Peaks, *, reading: Reading = "ends", cut: float = CUT) -> 
 
     def compute(values: Floats) -> Floats:
         logs, times = np.log(values[:count]), values[count:]
-        if reading == "ends":
-            delta = (logs[0] - logs[-1]) / (half_cycles[-1] * math.pi)
-        else:
-            weights = relative**-2
-            centred = half_cycles - np.average(half_cycles, weights=weights)
-            delta = -(weights * centred) @ logs / ((weights * centred) @ centred) / math.pi
+        delta = (logs[0] - logs[-1]) / (half_cycles[-1] * math.pi)
         period = (
             mean_period(times)
             if full.size == count - 2
@@ -72,8 +66,6 @@ def from_peaks(peaks: Peaks, *, reading: Reading = "ends", cut: float = CUT) -> 
     covariance = propagated(compute, values, stderr)
     if not small.known:
         misfit = math.nan
-    if misfit > MISFIT and reading == "line":
-        covariance = covariance * np.array([[1.0, misfit**0.5], [misfit**0.5, misfit]])
     if misfit > MISFIT:
         warnings.append(
             f"the decay is not exponential: chi^2 per degree of freedom is {misfit:.3g} about a "
@@ -81,14 +73,13 @@ def from_peaks(peaks: Peaks, *, reading: Reading = "ends", cut: float = CUT) -> 
             "include non-viscous damping"
         )
     names = ("w0", "c_over_m")
-    way = "the first and the last of" if reading == "ends" else "a line through the logarithms of"
     return identified(
         names,
         estimates,
         covariance,
         used=(
-            f"{way} peaks {small.index[0]} to {small.index[-1]} ({count}{under}); the mean of "
-            f"{full.size} overlapping periods"
+            f"the first and the last of peaks {small.index[0]} to {small.index[-1]} "
+            f"({count}{under}); the mean of {full.size} overlapping periods"
         ),
         warnings=warnings,
         misfit=misfit if small.known else None,

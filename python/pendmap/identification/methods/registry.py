@@ -72,17 +72,15 @@ def apply_method(
 def identify_peaks(peaks: Peaks, names: Iterable[str]) -> dict[str, Identification]:
     """Identify damping from measured peaks alone.
 
-    Standard errors of peaks are estimated from their scatter unless given; with too few peaks there
-    are none, and no intervals.
+    Standard errors of peaks are estimated from their scatter; with too few peaks there are none,
+    and no intervals.
     """
-    peaks = peaks.later(-float(peaks.time[0])) if len(peaks) else peaks
-    if not peaks.known:
-        size = peaks.time.shape
-        peaks = dataclasses.replace(
-            peaks,
-            stderr_time=np.full(size, scatter(peaks.time)),
-            stderr_amplitude=np.full(size, scatter(np.abs(peaks.amplitude))),
-        )
+    size = peaks.time.shape
+    peaks = dataclasses.replace(
+        peaks.later(-float(peaks.time[0])) if len(peaks) else peaks,
+        stderr_time=np.full(size, scatter(peaks.time)),
+        stderr_amplitude=np.full(size, scatter(np.abs(peaks.amplitude))),
+    )
     results = {name: apply_method(name, peaks) for name in names}
     for name, one in results.items():
         # Errors of 0 are unknown errors; a fit estimates errors from its residuals.
