@@ -16,6 +16,7 @@ import pytest
 import pendmap
 from conftest import COMMAND
 from decays import decay, record
+from pendmap.identification.report import as_json
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -100,18 +101,33 @@ def test_corrections_of_a_record_are_said(tmp_path: Path, pendmap_command: Run) 
 def test_json_has_every_method(decay_file: Path, pendmap_command: Run, tmp_path: Path) -> None:
     run = pendmap_command("identify", decay_file, "--json")
     assert run.returncode == 0, run.stderr
-    found: dict[str, Any] = json.loads(run.stdout)
-    assert found["best"] == "trajectory"
-    assert found["model"] is None
-    assert found["with_drag"] is None
+    result: dict[str, Any] = json.loads(run.stdout)
+    assert result["best"] == "trajectory"
+    assert result["model"] is None
+    assert result["with_drag"] is None
     for name in ("combined", "log_decrement", "de_paula", "trajectory", "energy_balance"):
-        assert set(FIELDS) <= set(found["methods"][name]), name
-    best = found["methods"]["trajectory"]
+        assert set(FIELDS) <= set(result["methods"][name]), name
+    best = result["methods"]["trajectory"]
     assert best["zeta"] == pytest.approx(best["c_over_m"] / (2 * best["w0"]), rel=1e-12)
     assert best["theta_r"] == pytest.approx(best["Tr"] / best["w0"] ** 2, rel=1e-12)
-    assert found["methods"]["log_decrement"]["Tr"] is None
-    assert found["methods"]["log_decrement"]["theta_r"] is None
+    assert result["methods"]["log_decrement"]["Tr"] is None
+    assert result["methods"]["log_decrement"]["theta_r"] is None
     assert [path.name for path in tmp_path.iterdir()] == ["decay.csv"]
+    same = as_json(pendmap.identify(decay_file))["methods"]
+    assert result["methods"] == json.loads(json.dumps(same))
+
+
+def test_the_command_says_the_parameters_first(decay_file: Path, pendmap_command: Run) -> None:
+    short = pendmap_command("identify", decay_file, "--out", "a.toml")
+    first, second, *_ = short.stdout.splitlines()
+    pattern = r"w0 = 6\.\d+\(\d+\) rad/s, c/m = 0\.\d+\(\d+\) 1/s, Tr = .* rad/s\^2"
+    assert re.fullmatch(pattern, first)
+    assert second.startswith("trajectory: ")
+    assert "log_decrement" not in short.stdout
+    long = pendmap_command("identify", decay_file, "--out", "b.toml", "--verbose")
+    assert long.stdout.startswith(f"{first}\n")
+    assert "log_decrement" in long.stdout
+    assert max(map(len, long.stdout.splitlines())) <= 80
 
 
 def test_methods_and_an_effect_can_be_chosen(decay_file: Path, pendmap_command: Run) -> None:

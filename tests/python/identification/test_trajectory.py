@@ -218,7 +218,7 @@ def test_untrusted_samples_are_left_out(decay: np.ndarray) -> None:
 
 def test_bad_fits_are_refused(decay: np.ndarray) -> None:
     with pytest.raises(InputError, match="after the one before"):
-        joint_fit(TIME[::-1], decay[::-1], sigma=1e-3, start={"w0": 6.0})
+        fit_runs([FitRun(TIME[::-1], decay[::-1], 1e-3)], Rig(w0=6.0), ["w0"])
     run = FitRun(TIME, decay, 1e-3)
     with pytest.raises(InputError, match=r"free must be among .*, got 'quadratic_drag.q'"):
         fit_runs([run], Rig(w0=6.2), ["quadratic_drag.q"])
