@@ -23,7 +23,7 @@ import numpy as np
 
 from benchmarks.peers.report import machine, note, say, table
 from pendmap.identification import Estimate, Identification, Peaks, find_peaks, identify
-from pendmap.identification.methods import combined, de_paula, log_decrement
+from pendmap.identification.methods import combined, lines
 from pendmap.identification.period import mean_period
 from pendmap.identification.table1 import State, peak_errors
 from pendmap.virtual_rig.effects.base import Drive
@@ -120,12 +120,12 @@ def choices(peaks: Peaks) -> dict[str, Identification]:
             )
         for cut in (12.0, 30.0, 90.0, 180.0):
             name = f"log_decrement, {floor:g} to {cut:g} deg"
-            made[name] = log_decrement.from_peaks(some, cut=math.radians(cut))
+            made[name] = lines.log_decrement(some, cut=math.radians(cut))
         for cut in (6.0, 12.0, 30.0, 60.0):
             for top in (90.0, 180.0):
                 slow, fast = np.radians((floor, cut)), np.radians((cut, top))
                 name = f"de_paula, fast {cut:g} to {top:g}, slow {floor:g} to {cut:g} deg"
-                made[name] = de_paula.from_peaks(some, fast=tuple(fast), slow=tuple(slow))
+                made[name] = lines.de_paula(some, fast=tuple(fast), slow=tuple(slow))
     return {name: each for name, each in made.items() if each.applicable}
 
 

@@ -22,6 +22,13 @@ if TYPE_CHECKING:
     from pendmap.identification import Identification
 
 
+def written(path: Path, *columns: Floats, names: str = "theta_rad", form: str = "%.8f") -> Path:
+    """Write times and further columns to a file; return its path."""
+    table = np.stack(columns, axis=1)
+    np.savetxt(path, table, form, ",", header=f"t_s,{names}", comments="")
+    return path
+
+
 def run_of(time: Floats, angle: Floats, trusted: np.ndarray | None = None) -> Run:
     """Return a free decay."""
     good = np.ones(time.size, bool) if trusted is None else trusted

@@ -32,7 +32,6 @@ from pendmap.identification.methods.trajectory import (
     physical,
 )
 from pendmap.identification.peaks import Peaks, find_peaks
-from pendmap.identification.readings import as_fit_run
 from pendmap.identification.report import DRAG, IdentificationReport
 from pendmap.identification.table1 import table_of_run
 from pendmap.identification.turning import TooShortError
@@ -241,11 +240,7 @@ def _best(
         return None, Identification(BEST, warnings=(str(error),), applicable=False, converged=False)
     certain = joint.fit.converged or len(runs) > 1
     if certain and not unit_wrong(experiment, *runs):
-        refuse_astray(
-            experiment.path,
-            [as_fit_run(r, worth) for r, worth in zip(joint.runs, joint.readings, strict=True)],
-            joint.fit,
-        )
+        refuse_astray(experiment.path, joint.given, joint.fit)
     return joint, dataclasses.replace(identification_of(joint), method=BEST)
 
 

@@ -112,24 +112,6 @@ class Peaks:
         return dataclasses.replace(self, **some, kind=kind)
 
 
-def samples(
-    time: ArrayLike, theta: ArrayLike, trusted: ArrayLike | None = None
-) -> tuple[Floats, Floats]:
-    """Return the trusted samples; InputError if they are not finite or times do not increase."""
-    t, x = np.asarray(time, float), np.asarray(theta, float)
-    good = np.ones(t.shape, bool) if trusted is None else np.asarray(trusted, bool)
-    if t.ndim != 1 or t.shape != x.shape or t.shape != good.shape:
-        raise InputError(
-            f"time, theta, trusted must be rows, got {t.shape}, {x.shape}, {good.shape}"
-        )
-    t, x = t[good], x[good]
-    if not (np.isfinite(t).all() and np.isfinite(x).all()):
-        raise InputError("time and theta must be finite numbers where trusted, one is not")
-    if np.any(np.diff(t) <= 0):
-        raise InputError("time must increase, it does not")
-    return t, x
-
-
 def find_peaks(
     time: ArrayLike,
     theta: ArrayLike,
@@ -173,8 +155,17 @@ def find_peaks(
     errors are computed with three independent samples per count in the window. Interpolated samples
     between readings are not used.
     """
-    t, x = samples(time, theta, trusted)
-    t, first = from_first(t)
+    t, x = np.asarray(time, float), np.asarray(theta, float)
+    good = np.ones(t.shape, bool) if trusted is None else np.asarray(trusted, bool)
+    if t.ndim != 1 or t.shape != x.shape or t.shape != good.shape:
+        raise InputError(
+            f"time, theta, trusted must be rows, got {t.shape}, {x.shape}, {good.shape}"
+        )
+    (t, first), x = from_first(t[good]), x[good]
+    if not (np.isfinite(t).all() and np.isfinite(x).all()):
+        raise InputError("time and theta must be finite numbers where trusted, one is not")
+    if np.any(np.diff(t) <= 0):
+        raise InputError("time must increase, it does not")
     drawn = measured(t, x)
     if drawn is not None:
         t, x = t[drawn.places], x[drawn.places]

@@ -12,7 +12,6 @@ from pendmap.errors import InputError
 from pendmap.formatting import counted, estimate_text, interval, percent
 from pendmap.identification.methods.trajectory import identification_of
 from pendmap.identification.parameters import OFFSET, SENSOR
-from pendmap.identification.readings import as_fit_run
 from pendmap.identification.results import FitResult, Followed
 from pendmap.records.summary import doubts, finding_lines
 
@@ -114,9 +113,7 @@ class IdentificationReport(FitResult):
         """Return the fit of the trajectory method."""
         if self.joint is None:
             raise InputError(f"{self.run.name}: the trajectory method must have fitted it")
-        pairs = zip(self.joint.runs, self.joint.readings, strict=True)
-        fitted = [as_fit_run(run, reading) for run, reading in pairs]
-        return Followed(self.joint.fit, fitted, self.joint.runs)
+        return Followed(self.joint.fit, self.joint.given, self.joint.runs)
 
     @property
     def sound(self) -> Identification | None:
@@ -284,7 +281,7 @@ def as_text(report: IdentificationReport) -> list[str]:
     if report.table.left_out:
         lines.append(f"{report.run.name}: {report.table.left_out}")
     for name, result in report.methods.items():
-        if result is not best:
+        if result is not best and not report.peaks.lacking:
             lines += [f"{name}: {warning}" for warning in result.warnings]
         if name in report.table.lost:
             why = report.table.lost[name]

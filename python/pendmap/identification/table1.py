@@ -217,14 +217,9 @@ def table_of_run(run: Run, peaks: Peaks, identifications: Mapping[str, Identific
 
 def _row(what: str, asked: float, errors: Mapping[str, PeakErrors]) -> Row | None:
     """Return the row of the measured value nearest to ``asked``; None if there is none."""
-    column, measured = {}, math.nan
-    for name, method_errors in errors.items():
-        peak = what == "peak"
-        there, wrong = (
-            (method_errors.peak, method_errors.peak_error)
-            if peak
-            else (method_errors.period, method_errors.period_error)
-        )
+    column, measured, peak = {}, math.nan, what == "peak"
+    for name, one in errors.items():
+        there, wrong = (one.peak, one.peak_error) if peak else (one.period, one.period_error)
         if there.size == 0:
             return None
         # A period below all measured ones would select the last, noisiest ones.

@@ -16,6 +16,7 @@ import pytest
 import pendmap
 from conftest import COMMAND
 from decays import decay, record
+from fits import written
 from pendmap.identification.report import as_json
 
 if TYPE_CHECKING:
@@ -31,10 +32,7 @@ TRUTH = {"w0": 6.2, "c_over_m": 0.0496, "Tr": 0.08}
 def decay_file(tmp_path: Path) -> Path:
     """Return the file of a free decay, of two columns."""
     time, angle = record(decay(), seconds=60, rate=50, seed=3)
-    path = tmp_path / "decay.csv"
-    table = np.stack([time, angle], axis=1)
-    np.savetxt(path, table, delimiter=",", header="t_s,theta_rad", comments="", fmt="%.8f")
-    return path
+    return written(tmp_path / "decay.csv", time, angle)
 
 
 def test_from_a_record_to_its_basins(
@@ -87,8 +85,7 @@ def test_the_whole_result_is_written_and_drawn(
 
 def test_corrections_of_a_record_are_said(tmp_path: Path, pendmap_command: Run) -> None:
     time, angle = record(decay(), seconds=30, rate=50, seed=3)
-    rows = np.column_stack((1000 * time, angle))
-    np.savetxt(tmp_path / "a.csv", rows, delimiter=",", header="t_s,theta_rad", comments="")
+    written(tmp_path / "a.csv", 1000 * time, angle)
     words = ("identify", "a.csv", "--method", "energy_balance")
     run = pendmap_command(*words, "--json", "--verbose")
     said = pendmap_command(*words, "--out", "a.toml").stdout
@@ -159,8 +156,8 @@ def test_no_model_is_written_where_the_search_did_not_converge(
 ) -> None:
     time = np.arange(0, 20, 0.02)
     chirp = 0.6 * np.cos(3 * time + 0.2 * time**2)
-    rows = np.column_stack((time, chirp + np.random.default_rng(0).normal(0, 1e-3, time.size)))
-    np.savetxt(tmp_path / "a.csv", rows, delimiter=",", header="t_s,theta_rad", comments="")
+    noise = np.random.default_rng(0).normal(0, 1e-3, time.size)
+    written(tmp_path / "a.csv", time, chirp + noise)
     for words in ((), ("--effect", "quadratic_drag")):
         run = pendmap_command("identify", "a.csv", *words, "--out", "a.toml")
         assert run.returncode == 2
@@ -233,8 +230,7 @@ def test_a_wrong_unit_is_reported_first(
     time, angle = record(decay(), seconds=20, seed=3)
     lab = tmp_path / "lab"
     lab.mkdir()
-    table = np.stack([time, np.degrees(angle)], axis=1)
-    np.savetxt(lab / "run.csv", table, delimiter=",", header="t_s,theta", comments="")
+    written(lab / "run.csv", time, np.degrees(angle), names="theta")
     (lab / "experiment.toml").write_text(
         '[columns]\nangle = { name = "theta", unit = "rad" }\n[[run]]\nfile = "run.csv"\n',
         encoding="utf-8",

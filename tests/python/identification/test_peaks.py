@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
 from decays import Decay, decay, record
-from fits import joint_fit, methods_of
+from fits import joint_fit, methods_of, written
 from pendmap import InputError, read_experiment
 from pendmap.identification import Peaks, find_peaks
 from pendmap.identification.readings import reading_of
@@ -252,10 +252,8 @@ def test_measured_samples_are_not_thinned() -> None:
 
 def test_look_reports_the_rate_of_the_measurement(tmp_path: Path) -> None:
     time, angle = record(WIDE, seconds=40, noise_deg=0.1)
-    table = np.column_stack(drawn(time, angle, 100, "straight lines"))
-    file = tmp_path / "dense.csv"
-    np.savetxt(file, table, fmt="%.6f", delimiter=",", header="time (s),angle (rad)", comments="")
-    run = read_experiment(file).runs[0]
+    dense = drawn(time, angle, 100, "straight lines")
+    run = read_experiment(written(tmp_path / "dense.csv", *dense, form="%.6f")).runs[0]
     (finding,) = [f for f in run.findings if f.what == "interpolated"]
     assert "100 Hz at 10 kHz, straight lines between" in finding.text
     assert finding.mended

@@ -14,6 +14,7 @@ from scipy.integrate import solve_ivp
 
 import pendmap
 from decays import decay, record
+from fits import written
 from pendmap import InputError, Rig, Run, virtual_rig
 from pendmap.identification import Identification, IdentificationReport
 from pendmap.identification.report import as_json
@@ -160,11 +161,8 @@ def test_the_models_file_keeps_the_covariance(report: IdentificationReport, tmp_
 
 
 def test_records_are_taken_in_all_their_forms(tmp_path: Path, report: IdentificationReport) -> None:
-    files = []
-    for run in report.runs:
-        files.append(tmp_path / run.file)
-        rows = np.column_stack((run.time, run.theta))
-        np.savetxt(files[-1], rows, delimiter=",", header="t_s,theta_rad", comments="", fmt="%.17g")
+    runs = report.runs
+    files = [written(tmp_path / r.file, r.time, r.theta, form="%.17g") for r in runs]
     read = [pendmap.read_experiment(file) for file in files]
     names = ["trajectory"]
     forms = [files, [str(file) for file in files], [read[0], read[1].runs[0]], tmp_path]

@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 import pendmap
 from accelerations import GRAVITY, TRUTH, experiment, readings
 from decays import decay, record
-from fits import methods_of
+from fits import methods_of, written
 from pendmap import InputError, render
 from pendmap.comparison import compare
 from pendmap.comparison.data import split_records
@@ -48,15 +48,9 @@ def rates(  # noqa: PLR0913 (the release and the sensor)
     return time, rate + bias + noise * np.random.default_rng(seed).standard_normal(time.size)
 
 
-def written(path: Path, *columns: Floats, names: str = "Gyroscope z (rad/s)") -> Path:
-    header = f"t_s,{names}"
-    table = np.stack(columns, axis=1)
-    np.savetxt(path, table, delimiter=",", header=header, comments="", fmt="%.8g")
-    return path
-
-
 def read(folder: Path, *columns: Floats, names: str = "Gyroscope z (rad/s)") -> Run:
-    return pendmap.read_experiment(written(folder / "run.csv", *columns, names=names)).runs[0]
+    path = written(folder / "run.csv", *columns, names=names, form="%.8g")
+    return pendmap.read_experiment(path).runs[0]
 
 
 def accelerated(
@@ -251,7 +245,7 @@ def test_a_gyroscope_in_a_forced_run(tmp_path: Path) -> None:
     time = np.arange(2000) / 100
     made = solve_ivp(slope, (0, time[-1]), [1.0, 0.0], "DOP853", time, rtol=1e-11, atol=1e-12)
     noise = 5e-3 * np.random.default_rng(0).standard_normal(time.size)
-    written(tmp_path / "run.csv", time, made.y[1] + 0.01 + noise)
+    written(tmp_path / "run.csv", time, made.y[1] + 0.01 + noise, names="gyro_z (rad/s)")
     drive = "drive = { p = 0.3, Omega = 11.0, phi = 0.5 }"
     text = f'[[run]]\nfile = "run.csv"\nkind = "forced"\n{drive}\n'
     (tmp_path / "experiment.toml").write_text(text, encoding="utf-8")
@@ -273,7 +267,7 @@ def test_a_rate_in_coarse_steps(tmp_path: Path) -> None:
 
 
 def test_look_reports_noise_and_bias_of_a_gyroscope(tmp_path: Path) -> None:
-    there = pendmap.read_experiment(written(tmp_path / "run.csv", *rates()))
+    there = Experiment(tmp_path, (read(tmp_path, *rates()),))
     assert pendmap.noise_floor(there) == pendmap.noise_floor(there.runs[0])
     two = Experiment(Path(), (there.runs[0],) * 2)
     for given, text in ((two, "got 2 runs"), ("a.csv", "got 'a.csv'")):
@@ -323,7 +317,8 @@ def test_figure_text_model_and_comparison(tmp_path: Path, sensor: str) -> None:
     assert fields["methods"]["trajectory"]["bias"] == pytest.approx(bias, abs=0.02)
     assert any("bias = " in line for line in as_text(report))
     assert not {"bias", "tilt"} & set(identified_model(report).notes["covariance"]["names"])
-    render.draw(report, tmp_path / "sheet.png")
+    if sensor == "accelerometer":
+        render.draw(report, tmp_path / "sheet.png")
     # The other methods read the computed angle, and are less accurate.
     for name in ("energy_balance", "combined_repaired"):
         assert report.methods[name]["w0"] == pytest.approx(TRUTH["w0"], rel=0.01)

@@ -179,12 +179,12 @@ def inapplicable(reason: str, warnings: Sequence[str] = ()) -> Identification:
     return Identification(warnings=(*warnings, f"not applicable: {reason}"), applicable=False)
 
 
-def too_few(
-    count: int, least: int, total: int, where: str = "", warnings: Sequence[str] = ()
+def too_few(  # noqa: PLR0913, PLR0917 (what is counted, and why)
+    count: int, least: int, total: int, where: str = "", warnings: Sequence[str] = (), why: str = ""
 ) -> Identification:
     """Return an inapplicable result: ``count`` of ``total`` peaks, but ``least`` are needed."""
     peaks = f"{count} of {counted(total, 'peak')} {where}".strip()
-    return inapplicable(f"{peaks}, {least} are needed", warnings)
+    return inapplicable(f"{peaks}, {least} are needed{why}", warnings)
 
 
 def identified(  # noqa: PLR0913 (all of a result)

@@ -157,7 +157,8 @@ def from_peaks(peaks: Peaks, *, reading: Reading = "all", cut: float = CUT) -> I
     least = _FEWEST + (reading != "all") * 2
     if size.size < least:
         where = f"under {math.degrees(cut):.3g} degrees"
-        return too_few(size.size, least, len(peaks.turned), where, warnings)
+        why = ": the record ends above it" if len(peaks) and not len(small) else ""
+        return too_few(size.size, least, len(peaks.turned), where, warnings, why)
     parity = int(small.index[0]) % 2
     count = len(small)
 

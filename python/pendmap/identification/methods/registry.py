@@ -10,13 +10,7 @@ import numpy as np
 
 from pendmap.errors import InputError
 from pendmap.formatting import Estimate
-from pendmap.identification.methods import (
-    combined,
-    de_paula,
-    energy_balance,
-    log_decrement,
-    repaired,
-)
+from pendmap.identification.methods import combined, energy_balance, lines, repaired
 from pendmap.identification.methods.base import NEEDS_SAMPLES, Identification, inapplicable
 from pendmap.signal.robust import normal_scale
 
@@ -34,8 +28,8 @@ _OF_PEAKS: Final[Mapping[str, Callable[[Peaks], Identification]]] = {
     "combined_odd_ends": functools.partial(combined.from_peaks, reading="odd_ends"),
     "combined_odd_triplets": functools.partial(combined.from_peaks, reading="odd_triplets"),
     "combined_repaired": repaired.from_peaks,
-    "log_decrement": log_decrement.from_peaks,
-    "de_paula": de_paula.from_peaks,
+    "log_decrement": lines.log_decrement,
+    "de_paula": lines.de_paula,
 }
 
 METHODS: Final = (BEST, *_OF_PEAKS, "energy_balance")

@@ -19,8 +19,8 @@ from pendmap.identification.fit import fit_runs
 from pendmap.identification.methods.base import Identification
 from pendmap.identification.parameters import OFFSET, OPPOSING, SENSOR, opposing
 from pendmap.identification.readings import as_fit_run, reading_of_run
+from pendmap.identification.sensitivity import upper_limit
 from pendmap.identification.turning import TooShortError, rough_start
-from pendmap.identification.valley import upper_limit
 from pendmap.model import Rig
 from pendmap.model.effects import Effect
 from pendmap.signal.robust import span
@@ -34,8 +34,6 @@ if TYPE_CHECKING:
     from pendmap.records import Run
 
 
-TOO_GOOD: Final = 0.7
-"""chi^2 per degree of freedom below which sigma is reported as too large."""
 LACKING: Final = 4.0
 """Widening above which readings have equal weights: else the slowest alone would dominate."""
 
@@ -48,11 +46,10 @@ def identification_of(joint: JointFit) -> Identification:
     names = tuple(renamed.get(name, name) for name in fit.names)
     # If the model does not fit, errors are widened by the misfit.
     wider = math.sqrt(fit.widening)
-    widened_estimates = [
-        dataclasses.replace(e, stderr=None if e.stderr is None else wider * e.stderr)
-        for e in fit.estimates.values()
-    ]
-    estimates = dict(zip(names, widened_estimates, strict=True))
+    estimates = {
+        name: dataclasses.replace(e, stderr=None if e.stderr is None else wider * e.stderr)
+        for name, e in zip(names, fit.estimates.values(), strict=True)
+    }
     for name, limit in joint.limits.items():
         estimates[name] = Estimate(0.0, None, (0.0, limit))
     first = [name for name in ("w0", *OPPOSING) if name in estimates]
@@ -77,32 +74,24 @@ def identification_of(joint: JointFit) -> Identification:
     )
 
 
-def _reaches_0(estimate: Estimate) -> bool:
-    low, high = estimate.ci95 or (-math.inf, math.inf)
-    return low <= 0 <= high
-
-
 def _warnings(joint: JointFit, estimates: Mapping[str, Estimate]) -> list[str]:
     fit, readings, warnings = joint.fit, joint.readings, []
     every = {**estimates, **joint.negative}
     for name in opposing(fit.model.effects):
         if name in every and every[name].value < 0:
-            reaches = _reaches_0(every[name])
-            why = "its interval reaches 0" if reaches else "an effect is missing in the model"
+            _, high = every[name].ci95 or (-math.inf, math.inf)
+            why = "an effect is missing in the model" if high < 0 else "its interval reaches 0"
             if name in joint.negative:
                 why += "; it is held at 0, and the others are fitted again"
             elif name in OPPOSING:
                 why += "; the model has 0 in its place"
             warnings.append(f"{name} is {every[name].value:.3g}, which is unphysical: {why}")
-    ratio = fit.chi2 / max(fit.degrees, 1)
     if fit.widening > 1:
         warnings.append(
             f"the model does not fit: residuals are {fit.rms / joint.noise:.3g} times the noise; "
             f"errors are {math.sqrt(fit.widening):.2g} times as wide; an effect is missing in the "
             "model"
         )
-    elif ratio < TOO_GOOD and not any(reading.coarse for reading in readings):
-        warnings.append(f"residuals are {math.sqrt(ratio):.2g} times sigma: sigma is too large")
     if not fit.converged:
         warnings.append("the search did not converge")
     # A sensor's tilt is determined by large swings only: its interval is not reported.
@@ -191,6 +180,12 @@ class JointFit:
     limits: Mapping[str, float] = dataclasses.field(default_factory=dict)
 
     @property
+    def given(self) -> list[FitRun]:
+        """The runs as they are fitted."""
+        pairs = zip(self.runs, self.readings, strict=True)
+        return [as_fit_run(run, reading) for run, reading in pairs]
+
+    @property
     def noise(self) -> float:
         """Root mean square noise of the included readings, rad."""
         counts = [int(run.trusted.sum()) for run in self.runs]
@@ -225,7 +220,7 @@ def physical(joint: JointFit) -> JointFit:
     """
     while name := joint.fit.negative:
         known = {**joint.negative, name: joint.fit.estimates[name]}
-        given = [as_fit_run(r, worth) for r, worth in zip(joint.runs, joint.readings, strict=True)]
+        given = joint.given
         try:
             fit, worth = fit_from_start(given, joint.readings, start=joint.fit.model, held=known)
             # An estimate below 0 is wrong by no less than its size.
