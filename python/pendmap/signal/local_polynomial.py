@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from pendmap.signal.robust import NORMAL_MAD
+from pendmap.signal.robust import NORMAL_MAD, widened
 
 if TYPE_CHECKING:
     from pendmap.signal import Floats, Indices, Mask
@@ -227,23 +227,14 @@ def smoothed_velocity(time: Floats, theta: Floats, half: float) -> tuple[Floats,
     inside = slice(reach, time.size - reach)
     slope[inside] = np.correlate(theta, rows @ normal[1], "valid") / scale
     stderr[inside] = math.sqrt(normal[1, 1]) / scale
-    odd = np.flatnonzero(~_evenly(time, step, reach))
+    apart = np.append(np.abs(np.diff(time) / step - 1.0) > _EVEN, False)
+    uneven = widened(apart, reach)
+    uneven[:reach] = uneven[-reach:] = True
+    odd = np.flatnonzero(uneven)
     for begin in range(0, odd.size, _BLOCK):
         some = odd[begin : begin + _BLOCK]
         slope[some], stderr[some] = _slopes(time, theta, some, width, scale)
     return slope, stderr
-
-
-def _evenly(time: Floats, step: float, reach: int) -> Mask:
-    """Return whether the window of ``reach`` samples to each side is even, for each sample."""
-    even = np.zeros(time.size, bool)
-    # The limit holds for each interval of a window and, times the root of their number, the sum.
-    off = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(time) / step - 1.0) > _EVEN)))
-    drift = np.abs(time[2 * reach :] - time[: time.size - 2 * reach] - 2 * reach * step)
-    even[reach : time.size - reach] = (off[2 * reach :] == off[: time.size - 2 * reach]) & (
-        drift < _EVEN * step * math.sqrt(2 * reach)
-    )
-    return even
 
 
 def _slopes(
