@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import math
 from pathlib import Path
@@ -126,7 +127,8 @@ def test_the_errors_of_triplets_are_those_of_repeated_readings() -> None:
     rng = np.random.default_rng(3)
     sizes = recursion(0.2, 0.004, 0.002, 30)
     sign = (-1.0) ** np.arange(30)
-    found = decrement.triplets_of(Peaks.of(np.arange(30.0), sizes * sign, stderr_amplitude=1e-4))
+    peaks = Peaks.of(np.arange(30.0), sizes * sign)
+    found = decrement.triplets_of(dataclasses.replace(peaks, stderr_amplitude=np.full(30, 1e-4)))
     drawn_ = [
         decrement.triplets_of(
             Peaks.of(np.arange(30.0), sizes * sign + 1e-4 * rng.standard_normal(30))
