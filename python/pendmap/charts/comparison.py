@@ -23,7 +23,6 @@ from pendmap.units import Units
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from pendmap.charts.marks import Floats
     from pendmap.comparison import Comparison
     from pendmap.comparison.forced import Statistic
 
@@ -133,11 +132,9 @@ def _over_record(one: RunComparison) -> Panel:
         angle = readings - one.residual if run.rod_sensor is None else one.curve[0]
     shown, made = (np.where(run.trusted, values, np.nan) for values in (readings, angle))
     some = slice(None, None, max(1, run.time.size // DOTS))
-    dots: dict[str, Any] = {"colour": MEASURED, "size": 1.5, "name": PAIR[0]}
-    line: dict[str, Any] = {"colour": look(MODEL).colour, "width": 0.7, "name": PAIR[1]}
     marks: list[Mark] = [
-        Points(run.time[some], shown[some], **dots),
-        Line(run.time[some], made[some], **line),
+        Points(run.time[some], shown[some], colour=MEASURED, size=1.5, name=PAIR[0]),
+        Line(run.time[some], made[some], colour=look(MODEL).colour, width=0.7, name=PAIR[1]),
     ]
     up = names.angle(holding(shown))
     if sensor is not None:
@@ -199,15 +196,14 @@ def cycles(one: ForcedComparison, title: str, pair: Pair = PAIR) -> Panel:
             theta = np.append(theta, theta[0] + math.tau * result.model.w)
             curve = plane.broken_at_wrap(theta, np.append(velocity, velocity[0]))
             marks.append(Line(*curve.T, colour=model.colour, width=1.2, name=pair[1]))
-    sides = names.phase_plane((-reach, reach), plane.padded(speeds), _SI)
+    sides = names.phase_plane((-reach, reach), holding(speeds), _SI)
     return Panel(f"cycles {one.run.name}", title, *sides, marks)
 
 
 def statistics(one: ForcedComparison) -> Panel:
     """Return one row per statistic: the ensemble's histogram, and the record's value as a line."""
     marks: list[Mark] = []
-    for k, item in enumerate(one.statistics):
-        base = k + 1.0
+    for base, item in enumerate(one.statistics, 1):
         mine, low, high = (written(item, value, 3) for value in (item.measured, *item.ci95))
         unit = f" {item.unit}" if item.unit and math.isfinite(item.ci95[0]) else ""
         text = f"{item.name} {mine} ({low if low == high else f'{low} to {high}'}){unit}"
@@ -218,33 +214,30 @@ def statistics(one: ForcedComparison) -> Panel:
 
 
 def _histogram(one: Statistic, base: float) -> list[Mark]:
-    known = one.ensemble[np.isfinite(one.ensemble)]
-    ends = np.append(known, one.measured if math.isfinite(one.measured) else known[:0])
-    low, high = (float(ends.min()), float(ends.max())) if ends.size else (0.0, 1.0)
-    wide = high - low or 1.0
-    whole = not one.unit and wide < BINS
-    edges = np.arange(low - 0.5, high + 1) if whole else np.linspace(low, low + wide, BINS + 1)
-    counts, edges = np.histogram(known, edges)
-    never = one.ensemble.size - known.size
-    unit = TALL / max(counts.max(initial=0), never, 1)
-    places = 0.9 * (edges - edges[0]) / (edges[-1] - edges[0])
-    columns = zip(places[:-1], places[1:], counts, strict=True)
-    made = [_column(left, right, base, unit * n) for left, right, n in columns if n]
-    marks: list[Mark] = [Areas(made, colour=ENSEMBLE, name="ensemble")]
-    if never:
-        last, name = [_column(0.95, 1.0, base, unit * never)], "not settled by the end"
-        marks.append(Areas(last, colour=ENSEMBLE, name=name))
-        marks.append(Areas(last, colour="#ffffff", hatch="////", name=name))
-    marks.append(Line(np.array([0.0, 1.0]), np.full(2, base), colour=QUIET, width=0.6))
-    at = 0.975
-    if math.isfinite(one.measured):
-        at = 0.9 * (one.measured - edges[0]) / (edges[-1] - edges[0])
-    up = np.array([base, base - TALL])
-    return [*marks, Line(np.full(2, at), up, colour=MEASURED, width=1.6)]
-
-
-def _column(left: float, right: float, base: float, high: float) -> Floats:
-    return np.array([(left, base), (right, base), (right, base - high), (left, base - high)])
+    """Return a histogram; members not settled by the end are a hatched column at the right."""
+    every = np.append(one.ensemble, one.measured)
+    known = every[np.isfinite(every)]
+    low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
+    whole = not one.unit and high - low < BINS
+    edges = np.arange(low - 0.5, high + 1) if whole else np.linspace(low, high, BINS + 1)
+    wide = (edges[-1] - edges[0]) * (1 + 1e-9) or 1.0  # the last value is in the last column
+    place = np.where(np.isfinite(every), 0.9 * (every - edges[0]) / wide, 0.975)
+    counts, ends = np.histogram(place[:-1], [*np.linspace(0.0, 0.9, edges.size), 0.95, 1.0])
+    tall = base - TALL * counts / max(counts.max(), 1)
+    columns = [
+        np.array([(left, base), (right, base), (right, up), (left, up)])
+        for left, right, up in zip(ends[:-1], ends[1:], tall, strict=True)
+        if up < base
+    ]
+    marks: list[Mark] = [Areas(columns, colour=ENSEMBLE, name="ensemble")]
+    if counts[-1]:
+        name = "not settled by the end"
+        marks.append(Areas(columns[-1:], colour="#ffffff", hatch="////", name=name))
+    return [
+        *marks,
+        Line(np.array([0.0, 1.0]), np.full(2, base), colour=QUIET, width=0.6),
+        Line(np.full(2, place[-1]), np.array([base, base - TALL]), colour=MEASURED, width=1.6),
+    ]
 
 
 # Figures 8 and 9 of the paper.
@@ -254,16 +247,13 @@ def steady(runs: Sequence[ForcedComparison], title: str, subtitle: str) -> Chart
     """Return a phase plane for each run: the record as points, the model as a line."""
     panels = [cycles(one, f"{_drive(one)}: {_reached(one)}", OF_PAPER) for one in runs]
     rows = [panels[k : k + 2] for k in range(0, len(panels), 2)]
-    size = (0.7 * WIDTH, 3.3 * len(rows) + 1.2)
-    return Chart(title, subtitle, rows, columns=2, size=size)
+    return Chart(title, subtitle, rows, size=(0.7 * WIDTH, 3.3 * len(rows) + 1.2))
 
 
 def _reached(one: ForcedComparison) -> str:
     result = one.steady
-    if result is None:
-        return "no steady state"
-    if result.model is None:
-        return f"{result.measured.name}, not that of the model"
+    if result is None or result.model is None:
+        return f"{result.measured.name}, not that of the model" if result else "no steady state"
     return f"{result.measured.name}, amplitude of the model {100 * result.overestimate:+.2g} %"
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from typing import TYPE_CHECKING, Any, Final
 
@@ -10,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pendmap.charts import names
-from pendmap.charts.chart import Axis, Chart, Panel, Sheet, holding
-from pendmap.charts.identification import errors_of
+from pendmap.charts.chart import Axis, Chart, Panel, holding
+from pendmap.charts.identification import error_panels
 from pendmap.charts.marks import QUIET, Areas, Band, Level, Line, Mark, Points, Span, bars
 from pendmap.charts.methods import NOISE, look
 from pendmap.model.labels import unit_of
@@ -73,18 +72,21 @@ def parts(result: Discrepancy) -> dict[str, Chart]:
     starts = " and ".join(f"{one.starts} {one.kind}" for one in result.forecasts)
     forecasts = f"forecasts from {starts} starts on what was held out" if starts else ""
     gap = [by_run(result), *(forecast(result, one) for one in result.forecasts)]
-    torques = _torques(result)
+    torques = [torque(result, over) for over in OVER_SAID if _torque_rows(result, over)]
     pairs = [torques[k : k + 2] for k in range(0, len(torques), 2)]
     ranked = [ranking(result)] if result.scores.best() else []
     by_itself = "what each effect of the library would explain by itself"
     runs = [coefficients(result, name) for name in shown_coefficients(result)]
     worst = "the runs with the largest residuals of the baseline"
+    cycles = _cycles(result)
+    first_peak = "from the first measured peak on"
     made = {
         "residuals": ("Residuals", worst, [[panel] for panel in residuals(result)], 4.2),
         "gap": ("The gap", forecasts, [gap], 3.7),
         "torque": (LACKED, "per moment of inertia; bands: 95 %", pairs, 1.1 + 2.3 * len(pairs)),
         "ranking": ("Ranking", by_itself, [ranked], 3.5),
         "runs": ("Run by run", "bars and band: 95 %", [runs], 3.5),
+        "figure_7": ("Simulated periods and peaks", first_peak, cycles, 1.1 + 2.6 * len(cycles)),
     }
     return {
         name: Chart(title, text, rows, size=(SIZE[0], high), letters=False)
@@ -93,18 +95,16 @@ def parts(result: Discrepancy) -> dict[str, Chart]:
     }
 
 
-def cycles(result: Discrepancy) -> Sheet | None:
-    """Return the errors of simulated periods and peaks of both models, for each free run."""
-    runs = sorted(result.cycles, key=lambda one: (not one.held_out, -len(one.peaks)))[:CYCLES]
-    charts = []
-    for one in runs:
-        errors = one.errors
+def _cycles(result: Discrepancy) -> list[list[Panel]]:
+    """Return the errors of simulated periods and peaks of the models, a row for each free run."""
+    rows = []
+    for one in sorted(result.cycles, key=lambda one: (not one.held_out, -len(one.peaks)))[:CYCLES]:
+        errors, name = one.errors, one.name + (", held out" if one.held_out else "")
         if not result.adds:
             errors = {"baseline": errors["before"]} if "before" in errors else {}
-        title = one.name + (", held out" if one.held_out else "")
-        charts.append(dataclasses.replace(errors_of(errors, one.peaks, title), size=(8.6, 3.0)))
-    text = "from the first measured peak on"
-    return Sheet("Simulated periods and peaks", text, [charts]) if charts else None
+        titles = (f"{name}: each period", "each peak; time runs to the left")
+        rows += [error_panels(errors, one.peaks, titles)] if errors else []
+    return rows
 
 
 def _title(result: Discrepancy) -> str:
@@ -156,10 +156,8 @@ def _smoothed(residual: Floats, every: int) -> Floats:
     """Return means over ``every`` samples; NaN for a bin without samples."""
     rows = np.pad(residual, (0, -residual.size % every), constant_values=math.nan)
     rows = rows.reshape(-1, every)
-    known = np.isfinite(rows)
-    count = known.sum(axis=1)
-    total = np.where(known, rows, 0.0).sum(axis=1)
-    return np.where(count > 0, total / np.maximum(count, 1), math.nan)
+    count = np.isfinite(rows).sum(axis=1)
+    return np.where(count > 0, np.nansum(rows, axis=1) / np.maximum(count, 1), math.nan)
 
 
 def _runs(files: Sequence[str]) -> Axis:
@@ -245,11 +243,6 @@ def torque(result: Discrepancy, over: str) -> Panel:
     return Panel(over, title, Axis(OVER_SAID[over], ends), up, marks, root=f"torque/{over}")
 
 
-def _torques(result: Discrepancy) -> list[Panel]:
-    """Return the missing torque over each quantity that has bins."""
-    return [torque(result, over) for over in OVER_SAID if _torque_rows(result, over)]
-
-
 def ranking(result: Discrepancy) -> Panel:
     """Return the greatest scores at the baseline, with the effects found in colour."""
     best = [result.scores.scores[k] for k in result.scores.best()[:RANKED]]
@@ -300,46 +293,36 @@ def _together(result: Discrepancy, shown: str) -> tuple[float, float]:
     return estimate.value - half, estimate.value + half
 
 
-def _reach(result: Discrepancy, shown: str) -> tuple[float, float]:
-    """Return the limits of the axis; a run that hardly determines the effect is cut off."""
-    mean = result.nearest.fitted.fit.estimates[shown].value
-    known = [(v, e) for v, e in result.runs.coefficients[shown] if math.isfinite(e)]
-    errors = sorted(e for _, e in known)
-    reach = 6 * errors[len(errors) // 2] if errors else 0.0
-    spread = max((abs(v - mean) for v, e in known if e < reach), default=0.0)
-    wide = max(abs(end - mean) for end in _together(result, shown))
-    half = max(1.4 * spread, reach, 1.5 * wide) or 1.0
-    return mean - half, mean + half
-
-
 def coefficients(result: Discrepancy, shown: str) -> Panel:
-    """Return the value of a parameter from each run, and from all runs together."""
-    pairs = result.runs.coefficients[shown]
+    """Return the value of a parameter from each run, and from all runs together.
+
+    The axis contains the interval of all runs together, and runs of which at least half have a
+    smaller error; others are marked at its ends.
+    """
     mean = result.nearest.fitted.fit.estimates[shown].value
     power = 3 * math.floor(math.log10(abs(mean)) / 3) if mean else 0
-    scale = 10.0**-power
-    at = np.arange(len(pairs), dtype=float)
-    value, error = (scale * np.array([pair[k] for pair in pairs]) for k in (0, 1))
+    pairs = 10.0**-power * np.array(result.runs.coefficients[shown], dtype=float)
+    at, (value, error) = np.arange(len(pairs), dtype=float), pairs.T
+    together = [10.0**-power * end for end in _together(result, shown)]
     known = np.isfinite(error)
-    low, high = (scale * end for end in _reach(result, shown))
+    reach = 6 * float(np.median(error[known])) if known.any() else 0.0
     least, most = value - Z95 * error, value + Z95 * error
-    together = [scale * end for end in _together(result, shown)]
+    sure = known & (error < reach)
+    low, high = holding(together, least[sure], most[sure], margin=0.2)
     marks: list[Mark] = [
         Span(together, axis="y", colour=NOISE, name="all together"),
         Line(*bars(at[known], least[known], most[known]), colour=AFTER, width=1.0),
         Points(at[known], value[known], marker="s", size=4.0, colour=AFTER, name="own value"),
     ]
-    inner = high - low
     for which, place, mark, text in (
-        (known & (most > high), high - 0.03 * inner, "^", "beyond the axis"),
-        (known & (least < low), low + 0.03 * inner, "v", "beyond the axis"),
-        (~known, low + 0.06 * inner, "x", "undetectable"),
+        (known & (most > high), 0.97, "^", "beyond the axis"),
+        (known & (least < low), 0.03, "v", "beyond the axis"),
+        (~known, 0.06, "x", "undetectable"),
     ):
-        x = at[which]
-        if x.size:
-            spots = np.full(x.size, place)
+        if which.any():
+            spots = np.full(np.count_nonzero(which), low + place * (high - low))
             cross: dict[str, Any] = {"marker": mark, "size": 4.5, "edge_width": 1.0}
-            marks.append(Points(x, spots, colour=QUIET, name=text, **cross))
+            marks.append(Points(at[which], spots, colour=QUIET, name=text, **cross))
     times = f"$10^{{{power}}}$ " if power else ""
     unit = f"{times}{unit_of(shown, result.definition)}".strip()
     mine = shown.rpartition(".")[2]

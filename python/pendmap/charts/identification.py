@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.analysis.trajectory import simulate
-from pendmap.charts import decrement, half_cycles, names
+from pendmap.charts import half_cycles, names
 from pendmap.charts.chart import Axis, Chart, Panel, Sheet, bare, holding
 from pendmap.charts.marks import QUIET, Band, Level, Line, Mark, Points, Table, Text
 from pendmap.charts.methods import MEASURED, NOISE, NOISE_SAID, drawn, look, nothing
@@ -18,6 +18,7 @@ from pendmap.errors import InputError
 from pendmap.formatting import estimate_text, typographic
 from pendmap.identification.methods.registry import BEST
 from pendmap.identification.report import table1_table
+from pendmap.identification.table1 import first_state, simulated_peaks
 from pendmap.signal.robust import Z95, span
 
 if TYPE_CHECKING:
@@ -36,7 +37,6 @@ MOST: Final = 6_000  # Greatest number of residuals drawn
 DOTS: Final = 150  # Greatest number of readings drawn in a close view
 LINE: Final = 0.2  # Height of a row of the table, inches
 LETTERS: Final = 110  # Letters per line below the table
-RESTS: Final = "at rest"  # Entry for an error if the simulation has already come to rest
 NOTHING: Final = "no method can be applied, or there are fewer than three peaks"
 QUANTITIES: Final = {"w0": "w0 (rad/s)", "c_over_m": "c/m (1/s)", "Tr": "Tr (rad/s²)"}
 """Estimates in the table, with the heads of their columns."""
@@ -45,35 +45,31 @@ QUANTITIES: Final = {"w0": "w0 (rad/s)", "c_over_m": "c/m (1/s)", "Tr": "Tr (rad
 def sheet(
     report: IdentificationReport,
     *,
-    parts: Sequence[str] | None = None,
+    parts: Sequence[str] = (),
     title: str | None = None,
     subtitle: str | None = None,
 ) -> Sheet:
-    """Return the parts in one column, or more than two in two columns of nearly equal height."""
-    wanted = list(PARTS) if parts is None else list(parts)
-    unknown = [name for name in wanted if name not in PARTS]
-    if unknown or not wanted:
-        what = repr(unknown[0]) if unknown else "nothing"
-        raise InputError(f"parts must be among {', '.join(PARTS)}, got {what}")
-    charts = [make(report) for name, make in PARTS.items() if name in wanted]
+    """Return the parts, by default all, in one column, or more than two in two columns."""
+    for name in parts:
+        if name not in PARTS:
+            raise InputError(f"parts must be among {', '.join(PARTS)}, got {name!r}")
+    charts = [PARTS[name](report) for name in parts or PARTS]
     if title is not None and len(charts) == 1:
         charts = [dataclasses.replace(charts[0], title="")]
+    high = np.cumsum([0.0, *(chart.size[1] for chart in charts if chart.size)])
     columns = [charts]
     if len(charts) > 2:  # noqa: PLR2004
-        high = np.cumsum([0.0, *(chart.size[1] for chart in charts if chart.size)])
         k = min(range(1, len(charts)), key=lambda k: max(high[k], high[-1] - high[k]))
         columns = [charts[:k], charts[k:]]
     run, peaks = report.run, report.peaks
-    noise = (
-        f"{len(peaks)} peaks, {f'noise {peaks.sigma:.2g} rad' if peaks.sigma else 'no noise seen'}"
-    )
-    used = f"{run.trusted.sum()} of {run.time.size} samples for fitting"
-    text = f"{run.rate_hz:.5g} Hz, {span(run.time)}, {used};   {noise}"
-    if run.peaks_only:
-        text = f"{len(peaks)} peaks, {span(run.time)}"
-    elif len(report.runs) > 1:
+    noise = f"noise {peaks.sigma:.2g} rad" if peaks.sigma else "no noise seen"
+    text = f"{len(peaks)} peaks, {span(run.time)}"
+    if len(report.runs) > 1:
         fitted = f"fitted to {len(report.runs)} runs; drawn: {run.name}, the longest"
-        text = f"{fitted};   {span(run.time)}, {noise}"
+        text = f"{fitted};   {text}, {noise}"
+    elif not run.peaks_only:
+        used = f"{run.trusted.sum()} of {run.time.size} samples for fitting"
+        text = f"{run.rate_hz:.5g} Hz, {used};   {text}, {noise}"
     return Sheet(
         title or f"Identification: {run.name}", text if subtitle is None else subtitle, columns
     )
@@ -94,8 +90,10 @@ class Decay:
     @classmethod
     def of(cls, rig: Rig, peaks: Peaks, zero: float) -> Decay:
         """Return the simulation of a model whose sensor has a zero error, rad."""
-        begun, peak_time, peak = decrement.from_first_peak(rig, peaks, zero)
-        until = max(float(peaks.turned.time[-1]) - begun.time, 1e-3) * 1.01
+        first, last = first_state(peaks), float(peaks.turned.time[-1])
+        begun = dataclasses.replace(first, theta=first.theta - zero)
+        peak_time, peak = simulated_peaks(rig, begun, last)
+        until = max(last - begun.time, 1e-3) * 1.01
         run = simulate(rig, begun.theta, 0.0, until, samples=SAMPLES)
         time, theta = run["time"].values + begun.time, run["theta"].values + zero
         return cls(peak_time, peak + zero, time, theta)
@@ -130,11 +128,10 @@ def decays(report: IdentificationReport) -> Chart:
         last = [residuals(run, joint.fit.residuals[0], sigma, BEST, text)]
     if not made:
         chart = nothing(title, report.table.left_out or NOTHING)
-        if not (report.table.left_out and last):
-            return chart
-        return dataclasses.replace(chart, rows=[*chart.rows, last], size=(WIDTH, 2.6))
+        two = dataclasses.replace(chart, rows=[*chart.rows, last], size=(WIDTH, 2.6))
+        return two if last else chart
     ends = holding(turned.time, margin=0.01)
-    course = half_cycles.course_of(run, report.peaks)
+    course = half_cycles.Course.of(run, report.peaks)
     spans = half_cycles.first_and_last(turned, NEAR)
     titles = ("the beginning", "the end") if len(spans) > 1 else ("the angle",)
     pairs = zip(titles, spans, strict=True)
@@ -220,17 +217,11 @@ def residuals(run: Run, residual: Floats, sigma: float, method: str, title: str)
 def errors(report: IdentificationReport) -> Chart:
     """Return the errors of periods and peaks of every model."""
     title, known = "Errors of simulated periods and peaks", report.table.errors
-    if report.table.left_out:
-        return nothing(title, report.table.left_out)
-    return errors_of({name: known[name] for name in drawn(known)}, report.peaks, title)
-
-
-def errors_of(known: Mapping[str, PeakErrors], peaks: Peaks, title: str) -> Chart:
-    """Return the errors of periods and peaks by model."""
-    if not known:
-        return nothing(title, NOTHING)
+    if report.table.left_out or not known:
+        return nothing(title, report.table.left_out or NOTHING)
+    shown = {name: known[name] for name in drawn(known)}
     titles = ("of each period", "of each peak; time runs to the left")
-    return Chart(title, "", [error_panels(known, peaks, titles)], size=(WIDTH, 3.6))
+    return Chart(title, "", [error_panels(shown, report.peaks, titles)], size=(WIDTH, 3.6))
 
 
 def error_panels(
@@ -267,7 +258,7 @@ def table(report: IdentificationReport) -> Chart:
     head, errors = table1_table(report)
     heads = [] if report.table.left_out else head[1:]
     dash, of_method = "\N{EN DASH}", {name: cells for name, *cells in errors}
-    body, notes, reasons = [], [], []
+    body, reasons = [], []
     for name, method in report.methods.items():
         label = look(name).label
         if not method.applicable:
@@ -278,11 +269,8 @@ def table(report: IdentificationReport) -> Chart:
         cells = [dash if one is None else typographic(estimate_text(one)) for one in known]
         cells += [cell.removesuffix(" %") for cell in of_method.get(name, [dash] * len(heads))]
         body.append([label, *cells])
-    if body:
-        notes = ["in brackets: standard error of the last digits"]
-    if any(RESTS in row for row in body):
-        notes[0] += f";   {RESTS}: the simulation stands still by then"
-    notes += reasons
+    about = "in brackets: standard error of the last digits;   at rest: the simulation stands still"
+    notes = [about, *reasons] if body else reasons
     down = 2.5 + len(body)
     words = [
         Text(0.0, down + k, text, colour=QUIET, align=("left", "bottom"), size=8.0)
@@ -298,7 +286,7 @@ def table(report: IdentificationReport) -> Chart:
 
 PARTS: Final[dict[str, Callable[[IdentificationReport], Chart]]] = {
     "record": half_cycles.part,
-    "decrement": decrement.part,
+    "decrement": half_cycles.decrements,
     "decay": decays,
     "errors": errors,
     "table": table,

@@ -11,19 +11,7 @@ from pendmap.analysis.orbit_table import attractors_of
 from pendmap.charts import names, palette, plane
 from pendmap.charts.chart import Axis, Chart, Panel, holding
 from pendmap.charts.legend import colours_of, typeset
-from pendmap.charts.marks import (
-    DASHED,
-    NONE,
-    QUIET,
-    ZERO,
-    Band,
-    Level,
-    Line,
-    Mark,
-    Points,
-    Span,
-    Steps,
-)
+from pendmap.charts.marks import DASHED, QUIET, ZERO, Band, Level, Line, Points, Span, Steps
 from pendmap.files import facts
 from pendmap.formatting import counted, typographic, with_error
 from pendmap.units import Units
@@ -31,6 +19,7 @@ from pendmap.units import Units
 if TYPE_CHECKING:
     import xarray as xr
 
+    from pendmap.charts.marks import Mark
 
 _LINE, _MEAN, _BAND, _TRANSIENT = "#1d3557", "#d55e00", "#9db4d3", "#f8edd6"
 _BINS: Final = 60  # Number of bins of the distribution
@@ -89,25 +78,21 @@ def _mean_look(dataset: xr.Dataset) -> dict[str, Any]:
     return {"colour": _MEAN, "width": 1.6, "dash": DASHED, "name": text}
 
 
-def _level(dataset: xr.Dataset, axis: Literal["x", "y"] = "y") -> list[Mark]:
+def _level(dataset: xr.Dataset, axis: Literal["x", "y"] = "y") -> Level:
     value = float(dataset["largest_exponent"])
-    level = Level(value, axis=axis, order=2.0, path="value", **_mean_look(dataset))
-    return [level] if math.isfinite(value) else []
+    return Level(value, axis=axis, order=2.0, path="value", **_mean_look(dataset))
 
 
 def _growth(dataset: xr.Dataset) -> Panel:
     a, periods, growth = facts(dataset), dataset["elapsed"].values, dataset["growth"].values
     marks = [*_transient(dataset), Line(periods, growth, colour=_LINE, width=1.1, path="own")]
     rate, transient = float(a["per_period"]), max(int(a["transient_periods"]), 0)
-    look = _mean_look(dataset)
     if math.isfinite(rate) and math.isfinite(a["largest_exponent_stderr"]):
         begin = min(int(np.searchsorted(periods, transient)), periods.size - 1)
         # Over many decades the constant matters little, so that the line meets the end.
         last = growth[-1] if transient else rate * periods[-1]
         line = last + rate * (periods[begin:] - periods[-1])
-        marks.append(Line(periods[begin:], line, **look))
-    elif math.isfinite(float(a["largest_exponent"])):
-        marks.append(Line(NONE, NONE, **look))
+        marks.append(Line(periods[begin:], line, **_mean_look(dataset)))
     up = Axis("ln |δx|", holding(growth, 0.0))
     title = "growth along the start's own trajectory"
     return Panel("growth", title, _clock(dataset, ""), up, marks)
@@ -129,7 +114,7 @@ def _average(dataset: xr.Dataset) -> Panel:
         text = "regular motion: deviations grow as τ"
         marks.append(Line(periods, regular, width=1.0, dash=":", name=text, order=4.0))
         shown.append(regular)
-    marks += [*_level(dataset), Line(periods, mean, colour=_LINE, path="own", order=3.0)]
+    marks += [_level(dataset), Line(periods, mean, colour=_LINE, path="own", order=3.0)]
     across = Axis("periods averaged, each", (periods[0], periods[-1]), "log")
     title = f"mean over {a['trajectories']} trajectories"
     up = Axis(_rate(dataset), holding(*shown, margin=0.08))
@@ -146,7 +131,7 @@ def _sliding(dataset: xr.Dataset) -> Panel:
     whole = (elapsed[begin] == elapsed - width) & (width > 0)
     gained = growth[whole] - growth[begin[whole]]
     rates = gained / (max(width, 1) * float(a["forcing_period"]))
-    marks = [*_transient(dataset), *_level(dataset)]
+    marks = [*_transient(dataset), _level(dataset)]
     marks.append(Line(elapsed[whole].astype(float), rates, colour=_LINE, path="own", order=3.0))
     up = Axis(_rate(dataset), holding(rates, 0.0, float(a["largest_exponent"]), margin=0.08))
     title = f"exponent over {a['window']} periods"
@@ -157,13 +142,12 @@ def _sliding(dataset: xr.Dataset) -> Panel:
 def _distribution(dataset: xr.Dataset) -> Panel:
     values = dataset["finite_time_exponent"].values.ravel()
     density, edges = np.histogram(values, bins=_BINS, density=True)
-    marks: list[Mark] = [
+    marks = [
         Steps(edges, density, colour=_BAND, filled=True),
         Steps(edges, density, colour=_LINE, width=0.9, path="density"),
-        *_level(dataset, "x"),
+        _level(dataset, "x"),
+        Level(0.0, axis="x", colour=QUIET, width=0.6),
     ]
-    if edges[0] < 0 < edges[-1]:
-        marks.append(Level(0.0, axis="x", colour=QUIET, width=0.6))
     across = Axis(_rate(dataset), (float(edges[0]), float(edges[-1])))
     up = Axis("density", (0.0, 1.08 * float(density.max())))
     title = f"exponents over {dataset.attrs['window']} periods"
@@ -176,5 +160,5 @@ def _attractor(dataset: xr.Dataset) -> Panel:
     size = 2.0 if attractors_of(dataset)[0].chaotic else 7.0
     colour = palette.on_white(colours_of(dataset)[0])
     spots = Points(*at.T, colour=colour, size=size, path="points")
-    sides = names.phase_plane(theta, plane.padded(points[:, 1]), Units.of(facts(dataset)))
+    sides = names.phase_plane(theta, holding(points[:, 1]), Units.of(facts(dataset)))
     return Panel("attractor", "attractor, once a period", *sides, [spots])

@@ -119,9 +119,7 @@ def angle(ends: Ends, name: str = ANGLE) -> Axis:
 
 def sizes(name: str, *values: npt.ArrayLike) -> Axis:
     """Return an axis of positive values from 0, or a logarithmic one if they differ much."""
-    every = np.concatenate([np.ravel(np.asarray(one, dtype=float)) for one in values])
-    every = every[np.isfinite(every)]
-    low, high = float(every.min()), float(every.max())
+    low, high = holding(*values, margin=0.0)
     if high > _WIDE * low > 0:
         return Axis(name, (low / 1.4, 1.5 * high), "log")
     return Axis(name, (0.0, 1.15 * high))

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final, Literal
-
-import numpy as np
+from typing import TYPE_CHECKING, Final, Literal
 
 from pendmap.charts import names, plane
 from pendmap.charts.chart import Axis, Chart, Panel
@@ -12,9 +10,8 @@ from pendmap.charts.marks import Colours
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Sequence
+    from collections.abc import Callable, Sequence
 
-    import numpy.typing as npt
     import xarray as xr
 
     from pendmap.charts.marks import Ends, Floats, Mark
@@ -35,17 +32,6 @@ def over(varied: Sequence[str]) -> str:
     return " and ".join(names.symbol(name) for name in varied)
 
 
-def rates(exponents: npt.NDArray[Any]) -> Ends:
-    """Return the limits of an axis of exponents, with 0."""
-    return plane.padded(np.append(exponents[np.isfinite(exponents)], 0.0))
-
-
-def check_layer(layer: str | None, known: Sequence[str], where: str) -> None:
-    """Raise InputError for an unknown layer."""
-    if layer is not None and layer not in known:
-        raise InputError(f"layer must be one of {where}{', '.join(known)}, got {layer!r}")
-
-
 def counts(name: str, values: Floats, least: int = 0) -> Colours:
     """Return the colour scale of whole numbers from ``least`` on."""
     top = int(min(values.max(initial=1), _MOST_COUNT))
@@ -58,20 +44,22 @@ def layers(  # noqa: PLR0913, PLR0917 (parts of a chart)
     dataset: xr.Dataset,
     varied: tuple[str, str],
     titles: tuple[str, str],
-    layer: Layer,
-    shown: Sequence[str],
-    leading: Collection[str],
+    make: Layer,
+    known: Sequence[str],
+    shown: tuple[Sequence[str], Sequence[str]],
+    layer: str | None,
 ) -> Chart:
     """Return a panel of each layer over two parameters, the first one to the right.
 
-    ``layer`` returns title and marks of a layer between the ends of both axes. A figure shows the
-    ``leading`` layers, or one alone.
+    ``make`` returns title and marks of a layer between the ends of both axes. A figure shows
+    the first of ``shown``, a recording all; or both the ``layer`` alone, one of those ``known``.
     """
+    if layer not in {None, *known}:
+        raise InputError(f"no layer {layer!r} in this figure; it has {', '.join(known)}")
     across, up = (plane.outer_edges(dataset, name) for name in varied)
     sides = axis(dataset, varied[0]), axis(dataset, varied[1])
     panels = []
-    for name in shown:
-        title, marks = layer(name, across, up)
+    for name in [layer] if layer else [*shown[0], *shown[1]]:
+        title, marks = make(name, across, up)
         panels.append(Panel(name, title, *sides, marks))
-    row = [panel for panel in panels if len(panels) == 1 or panel.name in leading]
-    return Chart(*titles, [row], recorded=panels, ratio=0.85, tabs=True)
+    return Chart(*titles, [panels[: len(shown[0])]], recorded=panels, ratio=0.85, tabs=True)

@@ -7,7 +7,6 @@ display is needed.
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
@@ -16,15 +15,15 @@ from pendmap.charts import registry
 from pendmap.charts.chart import Chart, Sheet
 from pendmap.errors import InputError
 from pendmap.render import drawing, style
+from pendmap.render.report import write_report
 from pendmap.render.style import SUFFIXES
 
 if TYPE_CHECKING:
     import os
+    from pathlib import Path
 
     from matplotlib.colors import Colormap
     from matplotlib.figure import Figure
-
-    from pendmap.diagnosis import Discrepancy
 
 __all__ = ["SUFFIXES", "draw", "figure_of", "write_report"]
 
@@ -129,38 +128,3 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
         return figure_of(result, layer=layer, dpi=dpi, **look)
 
     return style.written(path, make, dpi=dpi)
-
-
-def write_report(result: Discrepancy, path: str | os.PathLike[str]) -> Path:
-    """Write the report of a diagnosis with its figures.
-
-    Parameters
-    ----------
-    result : Discrepancy
-        Result of ``pendmap.diagnosis.diagnose``.
-    path : str or path
-        ``.html``: one file with the figures in it. ``.md``: Markdown, with the figures as ``.png``
-        beside it. Without a suffix: a folder with both, ``report.html`` and ``report.md``.
-
-    Returns
-    -------
-    Path
-        The file or folder. Each file is complete; existing ones are replaced.
-
-    Raises
-    ------
-    InputError
-        For an unknown suffix.
-    OSError
-        If a file cannot be written.
-    """
-    from pendmap.render import report  # noqa: PLC0415 (scipy takes a while)
-
-    target = Path(path)
-    if target.suffix.lower() not in {"", *report.SUFFIXES} and not target.is_dir():
-        known = " or ".join(report.SUFFIXES)
-        raise InputError(
-            f"cannot write {str(target)!r}: suffix must be {known}, or it must be a folder, got "
-            f"{target.suffix!r}"
-        )
-    return report.write(result, target)

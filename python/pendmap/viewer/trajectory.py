@@ -12,13 +12,13 @@ import rerun.blueprint as rrb
 
 from pendmap.analysis.trajectory import energy
 from pendmap.charts import names, plane
-from pendmap.charts.chart import Panel
+from pendmap.charts.chart import Panel, holding
 from pendmap.errors import InputError
 from pendmap.files import facts
 from pendmap.units import TIME, Units
 from pendmap.viewer import moving, recording
+from pendmap.viewer.marks import Place
 from pendmap.viewer.moving import FASTEST, Look
-from pendmap.viewer.place import Place
 from pendmap.viewer.recording import TIMELINE
 
 if TYPE_CHECKING:
@@ -115,7 +115,7 @@ def refuse_beyond(time: Floats, velocity: Floats) -> None:
 
 def places(attrs: Attributes, velocity: Floats) -> list[Place]:
     """Return phase plane and section in frames that contain these velocities."""
-    units, theta, speeds = Units.of(attrs), (-math.pi, math.pi), plane.padded(velocity)
+    units, theta, speeds = Units.of(attrs), (-math.pi, math.pi), holding(velocity)
     sides, ratio = names.phase_plane(theta, speeds, units), names.proportion(theta, speeds, units)
     titles = {"phase": "Phase plane", "poincare": "Poincaré section"}
     return [Place.of(Panel(name, title, *sides, ()), ratio) for name, title in titles.items()]
