@@ -10,21 +10,10 @@ import numpy as np
 
 from pendmap.analysis.orbit_table import attractors_of
 from pendmap.analysis.sweeps.report import varied_names
-from pendmap.charts import names, palette, parameters, plane
+from pendmap.charts import names, palette, plane
 from pendmap.charts.chart import Axis, Chart, Panel, holding
 from pendmap.charts.legend import typeset
-from pendmap.charts.marks import (
-    DASHED,
-    QUIET,
-    Band,
-    Colours,
-    Image,
-    Level,
-    Line,
-    Points,
-    Text,
-    bars,
-)
+from pendmap.charts.marks import QUIET, Band, Colours, Image, Level, Line, Points, Text, bars
 from pendmap.files import facts
 from pendmap.formatting import typographic
 from pendmap.units import Units
@@ -87,7 +76,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
     number = math.prod(dataset.sizes[one] for one in dims)
     fixed = names.parameters(facts(dataset), dims)
     subtitle = f"{fixed};   {number} maps of {columns} × {rows} cells"
-    titles = f"Basins along {parameters.over(dims)}", subtitle
+    titles = f"Basins along {names.over(dims)}", subtitle
     if len(dims) == 1:
         return _line(dataset, dims[0], titles, layer)
     first, second = dims
@@ -100,7 +89,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
 
     known, others = [*LAYERS, *shares], [name for name in LAYERS if name not in _LEADING]
     varied, shown = (first, second), (_LEADING, others)
-    return parameters.layers(dataset, varied, titles, make, known, shown, layer)
+    return names.layers(dataset, varied, titles, make, known, shown, layer)
 
 
 def models(
@@ -133,7 +122,7 @@ def models(
 
 def _line(dataset: xr.Dataset, dim: str, titles: tuple[str, str], layer: str | None) -> Chart:
     """Return the chart over one parameter."""
-    every, below = listed(dataset), parameters.axis(dataset, dim)
+    every, below = listed(dataset), names.parameter_axis(dataset, dim)
     bare = Axis("", below.ends, ticks=()) if layer is None else below
     exponent = f"exponent\n{names.per_time(Units.of(facts(dataset)))}"
     whole, edge = dataset["basin_entropy"].values, dataset["boundary_basin_entropy"].values
@@ -196,7 +185,7 @@ def _entropies(dataset: xr.Dataset, dim: str) -> list[Mark]:
     edge = np.where(known, dataset["boundary_basin_entropy"].values, np.nan)
     text = "of the boundary (dashed: ln 2, fractal above)"
     return [
-        Level(math.log(2), colour=QUIET, dash=DASHED),
+        Level(math.log(2), colour=QUIET, dash="--"),
         Line(x, whole, colour=palette.CURVES[2], name="basin entropy", path="whole"),
         *_with_error(x, edge, dataset["boundary_basin_entropy_stderr"].values, "boundary", text),
     ]
@@ -207,7 +196,7 @@ def _uncertainty(dataset: xr.Dataset, dim: str) -> list[Mark]:
     value, error = (dataset[f"uncertainty_exponent{end}"].values for end in ("", "_stderr"))
     if not np.isfinite(value).any():
         return []
-    level = Level(1.0, colour=QUIET, dash=DASHED)
+    level = Level(1.0, colour=QUIET, dash="--")
     return [level, *_with_error(dataset[dim].values, value, error, "value")]
 
 
@@ -248,7 +237,7 @@ def _layer(
         boxes = plane.pixels(dataset, dataset["boundary_boxes"], cells)
         values = np.where(boxes > 0, values, np.nan)
     if layer == "attractors":
-        return title, values, parameters.counts(text, values)
+        return title, values, names.counts(text, values)
     if not unit:
         return title, values, Colours(text, "cividis", 0.0, 1.0)
     high = float(np.nanmax(values, initial=1e-3))

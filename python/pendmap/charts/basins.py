@@ -140,8 +140,7 @@ def _colours(dataset: xr.Dataset, layer: str, values: npt.NDArray[np.float32]) -
     if layer == "turns":
         size = np.abs(values)
         top = max(1.0, float(np.ceil(np.quantile(size, 0.98))))
-        step = math.ceil(top / 3)
-        ticks = [float(k) for k in range(-3 * step, 3 * step + 1, step) if abs(k) <= top]
+        ticks = [at for at, _ in plane.plain_ticks(-top, top) if at == round(at)]
         over: Any = "both" if size.max() > top else "neither"
         return Colours(name, colours, -top, top, beyond=over, ticks=ticks)
     low, high = (float(q) for q in np.quantile(values, [0.005, 0.995]))

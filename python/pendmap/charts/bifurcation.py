@@ -9,7 +9,7 @@ import numpy as np
 
 from pendmap._core import Attractor
 from pendmap.analysis.orbit_table import attractors_of
-from pendmap.charts import names, palette, parameters, plane
+from pendmap.charts import names, palette, plane
 from pendmap.charts.chart import Axis, Chart, Panel, holding
 from pendmap.charts.legend import colours_of, typeset
 from pendmap.charts.marks import QUIET, Image, Level, Mark, Points
@@ -49,7 +49,7 @@ class Family:
 def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -> Chart:
     """Return angles and velocities of the points, the sweeps, and the exponents."""
     varied = str(dataset.attrs["varied"])
-    below, every = parameters.axis(dataset, varied), families(dataset)
+    below, every = names.parameter_axis(dataset, varied), families(dataset)
     units, ends = Units.of(facts(dataset)), plane.outer_edges(dataset, varied)
     theta = plane.angles(dataset, dataset["point_theta"].values)
     speeds = holding(dataset["point_velocity"].values, 0.0)
@@ -69,7 +69,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
     ]
     count, starts = dataset.sizes[varied], int(dataset.attrs["starts"])
     return Chart(
-        f"Bifurcations over {parameters.over([varied])}",
+        f"Bifurcations over {names.over([varied])}",
         f"{names.parameters(facts(dataset), [varied])};   {count} values, {starts} starts each",
         [[panels[0]], [panels[2]], [panels[3]]],
         recorded=panels,

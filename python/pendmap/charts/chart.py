@@ -7,11 +7,13 @@ of several charts. No drawing library is imported here.
 from __future__ import annotations
 
 import dataclasses
+import textwrap
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
+from pendmap.charts.marks import QUIET, Text
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
@@ -30,14 +32,13 @@ class Axis:
 
     ``name`` is symbol and unit, separated by a blank. Without ``ends`` the axis contains the marks.
     With the ``scale`` ``angle`` labels are multiples of pi; ``signed`` is logarithmic beyond
-    ``straight`` on both sides of 0. Labels are values times ``factor``, or else ``ticks``.
+    ``straight`` on both sides of 0. The places of ``ticks``, if given, have their texts.
     """
 
     name: str = ""
     ends: Ends | None = None
     scale: Literal["plain", "angle", "log", "signed"] = "plain"
     straight: float = 0.0
-    factor: float = 1.0
     ticks: Sequence[tuple[float, str]] | None = None
 
 
@@ -170,6 +171,13 @@ def _named(panels: Sequence[Panel], layer: str) -> Panel:
 def bare(name: str, *marks: Mark, high: float = 1.0) -> Panel:
     """Return a panel without a frame, 1 wide and ``high`` from the top down."""
     return Panel(name, "", Axis("", (0.0, 1.0)), Axis("", (high, 0.0)), marks, bare=True)
+
+
+def nothing(title: str, why: str, letters: int = 90) -> Chart:
+    """Return a chart with the reason for an empty figure, in lines of at most ``letters``."""
+    why = textwrap.fill(f"{why[:1].upper()}{why[1:].rstrip('.')}.", letters)
+    words = Text(0.0, 0.0, why, colour=QUIET, align=("left", "top"))
+    return Chart(title, "", [[bare("nothing", words)]], size=(8.6, 0.9))
 
 
 def holding(*values: npt.ArrayLike, margin: float = 0.06) -> Ends:

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.charts import names, plane
-from pendmap.charts.chart import Axis, Chart, Panel, Sheet, bare, holding
+from pendmap.charts.chart import Axis, Chart, Panel, Sheet, bare, holding, nothing
 from pendmap.charts.identification import error_panels, residuals
-from pendmap.charts.marks import QUIET, Areas, Level, Line, Mark, Points, Span, Text
-from pendmap.charts.methods import MEASURED, look, nothing
+from pendmap.charts.marks import QUIET, Areas, Level, Line, Mark, Points, Text
+from pendmap.charts.palette import MEASURED, look
 from pendmap.comparison.experiment import written
 from pendmap.comparison.forced import ForcedComparison
 from pendmap.comparison.free import MODEL, RunComparison
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from pendmap.comparison import Comparison
     from pendmap.comparison.forced import Statistic
 
-    Pair = tuple[str, str]
     Compared = RunComparison | ForcedComparison
 
 ALL: Final = 3  # Number of runs up to which each has a row
@@ -42,15 +41,10 @@ HELD: Final = "#d55e00"
 NAMED: Final = 40  # Greatest number of runs named below a panel
 DOTS: Final = 6_000  # Greatest number of readings of a decay drawn
 SAMPLES: Final = 20_000  # Greatest number of samples of a curve drawn
-WELLS: Final = 14  # Number of wells up to which each has a band
-WELL, ENSEMBLE = "#f0f0f0", "#9ecae1"
-"""Colours of every other well, and of an ensemble."""
+ENSEMBLE: Final = "#9ecae1"  # Colour of an ensemble
 EVERY: Final = 3  # Step between the drawn samples of a measured cycle
 BINS: Final = 24  # Bins of a histogram of an ensemble
 TALL: Final = 0.36  # Height of a histogram over that of its row
-PAIR: Final = ("record", "model")
-OF_PAPER: Final = ("virtual rig", "identified model")
-"""Names of record and model in a comparison, and in the paper's figures."""
 _SI: Final = Units(si=True)
 
 
@@ -123,18 +117,15 @@ def _free(one: RunComparison) -> list[Panel]:
 def _over_record(one: RunComparison) -> Panel:
     run, sensor = one.run, one.run.accelerometer
     # The model's reading; the sensor's own errors appear in the residual alone.
-    if sensor is not None:
-        readings = sensor.gain * as_angles(run)
-        angle = readings - sensor.gain * one.residual
-    else:
-        readings = run.theta
-        # A gyroscope reads no angle.
-        angle = readings - one.residual if run.rod_sensor is None else one.curve[0]
+    readings = run.theta if sensor is None else sensor.gain * as_angles(run)
+    angle = readings - one.residual * (1.0 if sensor is None else sensor.gain)
+    if sensor is None and run.rod_sensor is not None:  # a gyroscope reads no angle
+        angle = one.curve[0]
     shown, made = (np.where(run.trusted, values, np.nan) for values in (readings, angle))
     some = slice(None, None, max(1, run.time.size // DOTS))
     marks: list[Mark] = [
-        Points(run.time[some], shown[some], colour=MEASURED, size=1.5, name=PAIR[0]),
-        Line(run.time[some], made[some], colour=look(MODEL).colour, width=0.7, name=PAIR[1]),
+        Points(run.time[some], shown[some], colour=MEASURED, size=1.5, name="record"),
+        Line(run.time[some], made[some], colour=look(MODEL).colour, width=0.7, name="model"),
     ]
     up = names.angle(holding(shown))
     if sensor is not None:
@@ -148,19 +139,15 @@ def _forced(one: ForcedComparison) -> list[Panel]:
         third = phase(one, member="a member of the ensemble")
     else:
         third = cycles(one, one.steady.measured.name)
-    return [history(one, PAIR), phase(one), third, statistics(one)]
+    return [history(one), phase(one), third, statistics(one)]
 
 
-def history(one: ForcedComparison, pair: Pair = OF_PAPER, *, member: str = "") -> Panel:
-    """Return the angle in turns against time, of the record or a member; wells are bands."""
+def history(one: ForcedComparison, *, member: str = "") -> Panel:
+    """Return the angle in turns against time, of the record or a member."""
     reading, colour = (one.example[0], look(MODEL).colour) if member else (one.measured, MEASURED)
     turns, every = reading / math.tau, max(1, one.time.size // SAMPLES)
-    low, high = math.floor(turns.min() + 0.5), math.ceil(turns.max() - 0.5)
-    line: dict[str, Any] = {"colour": colour, "width": 0.6, "name": pair[bool(member)]}
+    line: dict[str, Any] = {"colour": colour, "width": 0.6, "name": "model" if member else "record"}
     marks: list[Mark] = [Line(one.time[::every], turns[::every], **line)]
-    if high - low < WELLS:
-        wells = [(well - 0.5, well + 0.5) for well in range(low, high + 1, 2)]
-        marks.append(Span(wells, axis="y", colour=WELL, name="every other well"))
     up = Axis("θ/2π (turns)", holding(turns, margin=0.08))
     clock = Axis(names.TIME, (float(one.time[0]), float(one.time[-1])))
     return Panel("history", member or "record", clock, up, marks)
@@ -177,7 +164,7 @@ def phase(one: ForcedComparison, *, member: str = "") -> Panel:
     return Panel("phase", member or "record", *sides, [Line(*curve.T, colour=colour, width=0.4)])
 
 
-def cycles(one: ForcedComparison, title: str, pair: Pair = PAIR) -> Panel:
+def cycles(one: ForcedComparison, title: str) -> Panel:
     """Return the steady state of a record as points, and that of the model as a line."""
     result, model = one.steady, look(MODEL)
     marks: list[Mark] = []
@@ -187,15 +174,14 @@ def cycles(one: ForcedComparison, title: str, pair: Pair = PAIR) -> Panel:
         speeds = np.concatenate([cycle.velocity for cycle in every])
         if result.measured.w == 0:
             reach = 1.08 * max(float(np.abs(cycle.theta).max()) for cycle in every)
-        some = slice(None, None, EVERY)
-        at = plane.wrapped(result.measured.theta)[some], result.measured.velocity[some]
-        circle: dict[str, Any] = {"fill": "none", "size": 4.0, "edge_width": 0.8}
-        marks = [Points(*at, colour=MEASURED, name=pair[0], **circle)]
+        at = plane.wrapped(result.measured.theta), result.measured.velocity
+        circle: dict[str, Any] = {"fill": "none", "size": 4.0, "edge_width": 0.8, "name": "record"}
+        marks = [Points(at[0][::EVERY], at[1][::EVERY], colour=MEASURED, **circle)]
         if result.model is not None:
             theta, velocity = result.model.theta, result.model.velocity
             theta = np.append(theta, theta[0] + math.tau * result.model.w)
             curve = plane.broken_at_wrap(theta, np.append(velocity, velocity[0]))
-            marks.append(Line(*curve.T, colour=model.colour, width=1.2, name=pair[1]))
+            marks.append(Line(*curve.T, colour=model.colour, width=1.2, name="model"))
     sides = names.phase_plane((-reach, reach), holding(speeds), _SI)
     return Panel(f"cycles {one.run.name}", title, *sides, marks)
 
@@ -245,7 +231,7 @@ def _histogram(one: Statistic, base: float) -> list[Mark]:
 
 def steady(runs: Sequence[ForcedComparison], title: str, subtitle: str) -> Chart:
     """Return a phase plane for each run: the record as points, the model as a line."""
-    panels = [cycles(one, f"{_drive(one)}: {_reached(one)}", OF_PAPER) for one in runs]
+    panels = [cycles(one, f"{_drive(one)}: {_reached(one)}") for one in runs]
     rows = [panels[k : k + 2] for k in range(0, len(panels), 2)]
     return Chart(title, subtitle, rows, size=(0.7 * WIDTH, 3.3 * len(rows) + 1.2))
 

@@ -6,13 +6,12 @@ import math
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
 from pendmap.charts import names
 from pendmap.charts.chart import Axis, Chart, Panel, holding
 from pendmap.charts.identification import error_panels
 from pendmap.charts.marks import QUIET, Areas, Band, Level, Line, Mark, Points, Span, bars
-from pendmap.charts.methods import NOISE, look
+from pendmap.charts.palette import NOISE, look
 from pendmap.model.labels import unit_of
 from pendmap.signal.robust import Z95
 
@@ -128,36 +127,30 @@ def residuals(result: Discrepancy) -> list[Panel]:
     rows = [row for row in result.gap.by_run if not row.held_out]
     order = sorted(range(len(runs)), key=lambda k: -rows[k].before / rows[k].noise_floor)[:RUNS]
     longest = max(float(runs[k].time[-1]) for k in order)
+    fits = (result.base.fitted.fit, result.best.fitted.fit)
     panels = []
     for k in sorted(order):
         run = runs[k]
         interval = float(np.median(np.diff(run.time)))
-        every = max(round(PART * math.tau / (result.base.fitted.fit.model.w0 * interval)), 1)
+        every = max(round(PART * math.tau / (fits[0].model.w0 * interval)), 1)
         time = run.time[::every]
         floor = 2e3 * rows[k].noise_floor / math.sqrt(every)
         text = "noise, 2 standard errors"
         marks: list[Mark] = [Span((-floor, floor), axis="y", colour=NOISE, name=text)]
         shown = [np.array([-floor, floor])]
-        fits = (result.base.fitted.fit, result.best.fitted.fit)
         for (name, colour), fit in zip(models(result), fits, strict=False):
-            residual = 1e3 * fit.residuals[k]
-            if run.trusted is not None:
-                residual = np.where(run.trusted, residual, math.nan)
-            mean = _smoothed(residual, every)[: time.size]
+            used = True if run.trusted is None else run.trusted
+            residual = np.where(used, 1e3 * fit.residuals[k], math.nan)
+            bins = np.pad(residual, (0, -residual.size % every), constant_values=math.nan)
+            bins = bins.reshape(-1, every)
+            count = np.isfinite(bins).sum(axis=1)
+            mean = np.where(count > 0, np.nansum(bins, axis=1) / np.maximum(count, 1), math.nan)
             marks.append(Line(time, mean, colour=colour, width=1.0, name=name))
             shown.append(mean)
         across = Axis("time (s)" if k == max(order) else "", (min(0.0, float(time[0])), longest))
         title = f"{run.name}: record less model, means over a tenth of a swing"
         panels.append(Panel(f"residual {k}", title, across, Axis("mrad", holding(*shown)), marks))
     return panels
-
-
-def _smoothed(residual: Floats, every: int) -> Floats:
-    """Return means over ``every`` samples; NaN for a bin without samples."""
-    rows = np.pad(residual, (0, -residual.size % every), constant_values=math.nan)
-    rows = rows.reshape(-1, every)
-    count = np.isfinite(rows).sum(axis=1)
-    return np.where(count > 0, np.nansum(rows, axis=1) / np.maximum(count, 1), math.nan)
 
 
 def _runs(files: Sequence[str]) -> Axis:
@@ -194,53 +187,43 @@ def forecast(result: Discrepancy, one: Forecast) -> Panel:
     """Return the forecast error against the horizon, with the noise."""
     floor = 1e3 * one.noise_floor
     marks: list[Mark] = [Level(floor, width=1.1, name="noise", path="noise")]
-    shown: list[npt.ArrayLike] = [floor]
-    for (name, colour), error in zip(models(result), (one.before, one.after), strict=False):
-        path = "before" if name == "baseline" else name
-        line = 1e3 * error
-        marks.append(Line(one.horizon, line, colour=colour, width=1.4, name=name, path=path))
-        shown.append(line)
+    errors = [1e3 * one.before, 1e3 * one.after][: len(models(result))]
+    for (name, colour), error in zip(models(result), errors, strict=True):
+        marks.append(Line(one.horizon, error, colour=colour, width=1.4, name=name, path=name))
     across = Axis("time ahead (s)", (0.0, float(one.horizon[-1])))
-    title = f"Error of forecasts, {one.kind} runs"
+    title, up = f"Error of forecasts, {one.kind} runs", names.sizes(RMS, floor, *errors)
     root = f"forecast/{one.kind}"
-    up = names.sizes(RMS, *shown)
     return Panel(f"forecast {one.kind}", title, across, up, marks, root=root)
 
 
 def _torque_rows(result: Discrepancy, over: str) -> list[list[dict[str, Any]]]:
-    """Return the torque bins of both models; empty if there are none."""
-    torques = (result.torque_before, result.torque_after)
-    both = zip(models(result), torques, strict=False)
-    rows = [torque.rows.get(over, []) for _, torque in both]
+    """Return the torque bins of the models; empty if there are none."""
+    torques = (result.torque_before, result.torque_after)[: len(models(result))]
+    rows = [torque.rows.get(over, []) for torque in torques]
     return rows if any(rows) else []
 
 
 def torque(result: Discrepancy, over: str) -> Panel:
-    """Return the missing torque of both models over one quantity, with 95 % bands."""
+    """Return the missing torque of the models over one quantity, with 95 % bands."""
     marks: list[Mark] = [Level(0.0, colour=QUIET, path="zero")]
-    every: list[dict[str, Any]] = []
-    shown = [np.zeros(1)]
-    for (name, colour), mine in zip(models(result), _torque_rows(result, over), strict=False):
-        if not mine:
+    shown, bins, text = [np.zeros(1)], [], "torque"
+    for (name, colour), rows in zip(models(result), _torque_rows(result, over), strict=False):
+        if not rows:
             continue
-        every += mine
-        path = "before" if name == "baseline" else name
-        edges = np.array([mine[0]["from"], *(row["to"] for row in mine)])
-        value, error = (np.array([row[key] for row in mine]) for key in ("torque", "stderr"))
-        low, high, line = (
-            np.append(v, v[-1]) for v in (value - Z95 * error, value + Z95 * error, value)
-        )
+        bins.append(np.array([rows[0]["from"], *(row["to"] for row in rows)]))
+        text = "torque along\nthe motion" if rows[0]["along_motion"] else "torque"
+        value, error = (np.array([row[key] for row in rows]) for key in ("torque", "stderr"))
+        value, error = np.append(value, value[-1]), np.append(error, error[-1])
+        shown += [value - Z95 * error, value + Z95 * error]
+        look: dict[str, Any] = {"colour": colour, "step": True}
         marks += [
-            Band(edges, low, high, colour=colour, alpha=0.25, step=True, path=f"{path}/bars"),
-            Line(edges, line, colour=colour, width=1.3, step=True, name=name, path=path),
+            Band(bins[-1], *shown[-2:], alpha=0.25, path=f"{name}/bars", **look),
+            Line(bins[-1], value, width=1.3, name=name, path=name, **look),
         ]
-        shown += [low, high]
-    ends = (min(r["from"] for r in every), max(r["to"] for r in every)) if every else (0.0, 1.0)
-    along = bool(every) and every[0]["along_motion"]
-    text = "torque along\nthe motion" if along else "torque"
     title = f"{LACKED}, over {over.replace('_', ' ')}"
+    across = Axis(OVER_SAID[over], holding(*bins, margin=0.0) if bins else None)
     up = Axis(f"{text} ({ACCELERATION})", holding(*shown))
-    return Panel(over, title, Axis(OVER_SAID[over], ends), up, marks, root=f"torque/{over}")
+    return Panel(over, title, across, up, marks, root=f"torque/{over}")
 
 
 def ranking(result: Discrepancy) -> Panel:

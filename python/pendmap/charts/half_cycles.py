@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.charts import names
-from pendmap.charts.chart import Axis, Chart, Panel, holding
-from pendmap.charts.marks import NONE, QUIET, ZERO, Areas, Band, Level, Line, Mark, Points, bars
-from pendmap.charts.methods import EVEN, MEASURED, NOISE, NOISE_SAID, ODD, look, nothing
+from pendmap.charts.chart import Axis, Chart, Panel, holding, nothing
+from pendmap.charts.marks import NONE, QUIET, ZERO, Band, Level, Line, Mark, Points, bars
+from pendmap.charts.palette import EVEN, MEASURED, NOISE, NOISE_SAID, ODD, look
 from pendmap.charts.record import UNUSED
 from pendmap.formatting import Estimate, estimate_text, typographic
 from pendmap.identification.methods.combined import CUT, triplets
@@ -60,29 +60,22 @@ class Course:
         return cls(time, theta - away, half, run.time[~good], run.theta[~good] - away)
 
 
-def first_and_last(peaks: Peaks, count: int = NEAR) -> list[tuple[float, float]]:
-    """Return the spans of the first and the last half cycles; one span if these are all."""
-    time = peaks.time
-    if time.size <= 2 * count + 1:
-        return [(float(time[0]), float(time[-1]))]
-    return [(float(time[0]), float(time[count])), (float(time[-1 - count]), float(time[-1]))]
-
-
 def part(report: IdentificationReport) -> Chart:
-    """Return the whole record, and angle, velocity and its sign at the first and the last peaks."""
+    """Return the whole record, and angle and velocity at the first and the last peaks."""
     run, peaks = report.run, report.peaks
     course, title = Course.of(run, peaks), "The record and its half cycles"
     few = len(peaks) < 3  # noqa: PLR2004 (a half cycle on either side)
     whole = _whole(course, peaks, thin=few or not run.peaks_only)
     if few:
         return Chart(title, "", [[whole]], size=(8.6, 2.4))
-    spans = first_and_last(peaks)
-    titles = ["the first half cycles", "the last half cycles"] if spans[1:] else ["all of them"]
-    columns = [_near(report, course, *one) for one in zip(titles, spans, strict=True)]
-    # Peaks alone have no velocity.
-    middle, last, high = ([1.0], 0.35, 4.6) if run.peaks_only else ([1.0, 0.8], 0.28, 5.6)
+    spans = {"the first half cycles": peaks.time[: NEAR + 1]}
+    spans["the last half cycles"] = peaks.time[-1 - NEAR :]
+    if len(peaks) <= 2 * NEAR + 1:
+        spans = {"all of them": peaks.time}
+    columns = [_near(report, course, *one) for one in spans.items()]
     rows = [[whole], *zip(*columns, strict=True)]
-    return Chart(title, "", rows, heights=(1.1, *middle, last), size=(8.6, high))
+    heights = (1.1, 1.0, 0.8)[: len(rows)]  # peaks alone have no velocity
+    return Chart(title, "", rows, heights=heights, size=(8.6, 0.7 + 1.6 * sum(heights)))
 
 
 def _whole(course: Course, peaks: Peaks, *, thin: bool) -> Panel:
@@ -100,8 +93,8 @@ def _whole(course: Course, peaks: Peaks, *, thin: bool) -> Panel:
     return Panel("whole", title, clock, names.angle(holding(theta)), marks)
 
 
-def _near(report: IdentificationReport, course: Course, title: str, span: Ends) -> list[Panel]:
-    """Return angle with peaks and crossings, velocity, and its sign, over a span."""
+def _near(report: IdentificationReport, course: Course, title: str, span: Floats) -> list[Panel]:
+    """Return angle with peaks and crossings, and velocity, over these times."""
     run, peaks = report.run, report.peaks
     ends = holding(span, margin=0.02)
     bare = Axis("", ends, ticks=())
@@ -125,8 +118,8 @@ def _near(report: IdentificationReport, course: Course, title: str, span: Ends) 
         up = names.angle(holding(speed), names.speed(Units(si=True)))
         marks = [*_coloured(time, speed, half, 1.1), ZERO]
         panels.append(Panel("velocity", "", bare, up, marks))
-    signs = Axis("sign", (-1.35, 1.35), ticks=[(-1, typographic("-1")), (0, "0"), (1, "1")])
-    return [*panels, Panel("sign", "", Axis(names.TIME, ends), signs, _sign(peaks))]
+    panels[-1] = dataclasses.replace(panels[-1], x=Axis(names.TIME, ends))
+    return panels
 
 
 def _within(time: Floats, ends: Ends) -> NDArray[np.bool_]:
@@ -178,18 +171,6 @@ def _velocity(
         if np.count_nonzero(some) > 4:  # noqa: PLR2004 (coefficients of a cubic)
             speed[k] = np.polyfit(course.time[some] - at, course.theta[some], 3)[2]
     return time, half, speed
-
-
-def _sign(peaks: Peaks) -> list[Mark]:
-    """Return the sign of the velocity, that of the change from each peak to the next."""
-    marks: list[Mark] = [ZERO]
-    for parity, colour in ((0, EVEN), (1, ODD)):
-        whole = np.flatnonzero((np.diff(peaks.index) == 1) & (peaks.index[:-1] % 2 == parity))
-        sign = np.sign(peaks.amplitude[whole + 1] - peaks.amplitude[whole])
-        begin, end, none = peaks.time[whole], peaks.time[whole + 1], np.zeros(whole.size)
-        corners = np.array([(begin, none), (end, none), (end, sign), (begin, sign)])
-        marks.append(Areas(list(corners.transpose(2, 0, 1)), colour=colour, alpha=0.85))
-    return marks
 
 
 # Figure 5.

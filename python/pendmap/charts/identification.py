@@ -11,9 +11,9 @@ import numpy as np
 
 from pendmap.analysis.trajectory import simulate
 from pendmap.charts import half_cycles, names
-from pendmap.charts.chart import Axis, Chart, Panel, Sheet, bare, holding
+from pendmap.charts.chart import Axis, Chart, Panel, Sheet, bare, holding, nothing
 from pendmap.charts.marks import QUIET, Band, Level, Line, Mark, Points, Table, Text
-from pendmap.charts.methods import MEASURED, NOISE, NOISE_SAID, drawn, look, nothing
+from pendmap.charts.palette import MEASURED, NOISE, NOISE_SAID, drawn, look
 from pendmap.errors import InputError
 from pendmap.formatting import estimate_text, typographic
 from pendmap.identification.methods.registry import BEST
@@ -24,17 +24,14 @@ from pendmap.signal.robust import Z95, span
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from pendmap.charts.half_cycles import Course
     from pendmap.charts.marks import Ends, Floats
     from pendmap.identification import IdentificationReport, PeakErrors, Peaks
     from pendmap.model import Rig
     from pendmap.records import Run
 
 WIDTH: Final = 8.6  # Width of a column, inches
-NEAR: Final = 5  # Number of half cycles of the close views
 SAMPLES: Final = 64  # Samples per swing of a simulation
 MOST: Final = 6_000  # Greatest number of residuals drawn
-DOTS: Final = 150  # Greatest number of readings drawn in a close view
 LINE: Final = 0.2  # Height of a row of the table, inches
 LETTERS: Final = 110  # Letters per line below the table
 NOTHING: Final = "no method can be applied, or there are fewer than three peaks"
@@ -119,7 +116,7 @@ def _line(x: Floats, y: Floats, method: str, width: float) -> Line:
 
 
 def decays(report: IdentificationReport) -> Chart:
-    """Return peaks, their differences, close views and residuals of every model."""
+    """Return peaks and their differences of every model, and residuals of the fitted one."""
     title = "The decay by each model"
     made, run, turned = simulated(report), report.run, report.peaks.turned
     last = []
@@ -131,15 +128,10 @@ def decays(report: IdentificationReport) -> Chart:
         two = dataclasses.replace(chart, rows=[*chart.rows, last], size=(WIDTH, 2.6))
         return two if last else chart
     ends = holding(turned.time, margin=0.01)
-    course = half_cycles.Course.of(run, report.peaks)
-    spans = half_cycles.first_and_last(turned, NEAR)
-    titles = ("the beginning", "the end") if len(spans) > 1 else ("the angle",)
-    pairs = zip(titles, spans, strict=True)
-    near = [_near(course, made, *one, only=run.peaks_only) for one in pairs]
-    shown = [[_envelope(turned, made, ends)], [_differences(turned, made, ends)], near]
-    shown += [last] if last else []
-    heights = (1.7, 1.35, 1.5, 0.75)[: len(shown)]
-    return Chart(title, "", shown, heights=heights, size=(WIDTH, 6.3 + 1.3 * len(last)))
+    shown = [[_envelope(turned, made, ends)], [_differences(turned, made, ends)], last]
+    shown = [row for row in shown if row]
+    heights = (1.7, 1.35, 0.75)[: len(shown)]
+    return Chart(title, "", shown, heights=heights, size=(WIDTH, 4.6 + 1.3 * len(last)))
 
 
 def _envelope(turned: Peaks, made: Mapping[str, Decay], ends: Ends) -> Panel:
@@ -174,25 +166,6 @@ def _noise(x: Floats, error: Floats) -> list[Mark]:
     """Return the band of the noise about 0, named if the noise is known."""
     name = NOISE_SAID if np.any(error > 0) else ""
     return [Band(x, -error, error, colour=NOISE, order=0.0, name=name)]
-
-
-def _near(
-    course: Course, made: Mapping[str, Decay], title: str, ends: Ends, *, only: bool
-) -> Panel:
-    inside = np.flatnonzero((course.time >= ends[0]) & (course.time <= ends[1]))
-    inside = inside[:: 1 if only else max(1, inside.size // DOTS)]
-    time, theta = course.time[inside], course.theta[inside]
-    size = 4.0 if only else 1.5
-    marks: list[Mark] = [Points(time, theta, colour=MEASURED, size=size, order=5.0)]
-    values = [theta]
-    for name, one in made.items():
-        shown = (one.time >= ends[0]) & (one.time <= ends[1])
-        marks.append(_line(one.time[shown], one.theta[shown], name, 1.1))
-        values.append(one.theta[shown])
-    # A model that decays too slowly would flatten the measured swing to a line.
-    bound = 3.0 * float(np.abs(theta).max()) if theta.size else math.inf
-    up = names.angle(holding(np.clip(np.concatenate(values), -bound, bound)))
-    return Panel(title, title, Axis(names.TIME, ends), up, marks)
 
 
 def residuals(run: Run, residual: Floats, sigma: float, method: str, title: str) -> Panel:

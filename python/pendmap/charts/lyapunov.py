@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
-from pendmap.analysis.orbit_table import attractors_of
-from pendmap.charts import names, palette, plane
+from pendmap.charts import names
 from pendmap.charts.chart import Axis, Chart, Panel, holding
-from pendmap.charts.legend import colours_of, typeset
-from pendmap.charts.marks import DASHED, QUIET, ZERO, Band, Level, Line, Points, Span, Steps
+from pendmap.charts.legend import typeset
+from pendmap.charts.marks import DASHED, QUIET, ZERO, Band, Level, Line, Span, Steps
 from pendmap.files import facts
 from pendmap.formatting import counted, typographic, with_error
 from pendmap.units import Units
@@ -28,14 +27,11 @@ _WIDTHS: Final = {1: 6.0, 2: 8.8, 3: 12.4}  # Width of a figure by its number of
 
 
 def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> Chart:
-    """Return growth and exponent; for chaos the distribution, and in recordings the attractor."""
+    """Return the growth of deviations; for chaos also the exponent and its distribution."""
     del cells
     panels = [_growth(dataset)]
     if dataset.sizes["window"]:
         panels += [_average(dataset), _distribution(dataset)]
-    else:
-        panels.append(_sliding(dataset))
-    attractor = [_attractor(dataset)] if dataset.sizes["point"] else []
     ends = {
         "undamped": "motion without damping",
         "undecided": "undecided",
@@ -47,7 +43,6 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
         f"Largest Lyapunov exponent: {of}",
         names.with_start(facts(dataset)),
         [panels],
-        recorded=[*panels, *attractor],
         size=(_WIDTHS[len(panels)], 4.3),
     ).only(layer, (_WIDTHS[1], 4.3))
 
@@ -121,24 +116,6 @@ def _average(dataset: xr.Dataset) -> Panel:
     return Panel("average", title, across, up, marks)
 
 
-def _sliding(dataset: xr.Dataset) -> Panel:
-    """Return exponents over ``window`` periods of the start's own trajectory."""
-    a = facts(dataset)
-    growth, elapsed = dataset["growth"].values, dataset["elapsed"].values
-    width = min(int(a["window"]), int(elapsed[-1] - elapsed[0]))
-    # In a selection only windows whose first period is selected too have an exponent.
-    begin = np.searchsorted(elapsed, elapsed - width)
-    whole = (elapsed[begin] == elapsed - width) & (width > 0)
-    gained = growth[whole] - growth[begin[whole]]
-    rates = gained / (max(width, 1) * float(a["forcing_period"]))
-    marks = [*_transient(dataset), _level(dataset)]
-    marks.append(Line(elapsed[whole].astype(float), rates, colour=_LINE, path="own", order=3.0))
-    up = Axis(_rate(dataset), holding(rates, 0.0, float(a["largest_exponent"]), margin=0.08))
-    title = f"exponent over {a['window']} periods"
-    clock = _clock(dataset, ", last of each")
-    return Panel("average", title, clock, up, marks, root="exponent")
-
-
 def _distribution(dataset: xr.Dataset) -> Panel:
     values = dataset["finite_time_exponent"].values.ravel()
     density, edges = np.histogram(values, bins=_BINS, density=True)
@@ -152,13 +129,3 @@ def _distribution(dataset: xr.Dataset) -> Panel:
     up = Axis("density", (0.0, 1.08 * float(density.max())))
     title = f"exponents over {dataset.attrs['window']} periods"
     return Panel("distribution", title, across, up, marks)
-
-
-def _attractor(dataset: xr.Dataset) -> Panel:
-    theta, points = plane.angles(dataset, dataset["point_theta"].values), plane.points(dataset)
-    at = plane.copies(dataset, points, *theta)
-    size = 2.0 if attractors_of(dataset)[0].chaotic else 7.0
-    colour = palette.on_white(colours_of(dataset)[0])
-    spots = Points(*at.T, colour=colour, size=size, path="points")
-    sides = names.phase_plane(theta, holding(points[:, 1]), Units.of(facts(dataset)))
-    return Panel("attractor", "attractor, once a period", *sides, [spots])

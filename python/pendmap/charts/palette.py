@@ -1,19 +1,8 @@
-"""Colours and markers of attractors by their type, so that each has one in every figure.
+"""Colours and markers of attractors by their type, and of the methods of an identification.
 
 The colours start from the palette of Okabe and Ito (2008), "Color universal design", which stays
 distinguishable under the common colour deficiencies; the further ones differ in lightness as well
-as in hue. Every kind has a family, and the direction and the period n choose within it:
-
-======================  ==================================================================
-rest, inverted rest     dark grey; taupe
-rotation, forward       vermillion, then orange, rust, ... as n grows
-rotation, backward      blue, then sky blue, navy, ...
-oscillation             bluish green, then yellow, olive, ...; (+) lighter, (-) darker
-quasiperiodic rotation  forward peach, backward ice blue
-chaos                   tumbling purple; rotating wine and violet; libration pink
-no attractor            undecided light grey; failed black
-======================  ==================================================================
-
+as in hue. Every kind has a family, and the direction and the period n choose within it.
 After its last colour a family repeats, darker, then lighter, and so on (:func:`lap`). Attractors
 around another turn of the line are coloured likewise. A colour does not depend on the other
 attractors of a map, and no drawing library is imported.
@@ -22,25 +11,20 @@ attractors of a map, and no drawing library is imported.
 from __future__ import annotations
 
 import functools
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from pendmap._core import Attractor
 
-UNDECIDED = "#e4e4e4"
-"""Cells not decided within the bound (label 0)."""
-
-FAILED = "#000000"
-"""Cells whose integration failed or diverged (label -1)."""
-
-UNNAMED = "#8a8a8a"
-"""Attractors of unknown name and kind."""
-
+UNDECIDED = "#e4e4e4"  # Cells not decided within the bound (label 0)
+FAILED = "#000000"  # Cells whose integration failed or diverged (label -1)
+UNNAMED = "#8a8a8a"  # Attractors of unknown name and kind
 _LINEAR = 0.04045  # Value of sRGB up to which it is proportional to luminance
-
 CONTRAST = 2.0
 """Least contrast (WCAG 2.2) of points with a white ground; yellow has 1.3, sky blue 2.3."""
 
@@ -172,3 +156,52 @@ def _place(attractor: Attractor, further: int = 0) -> tuple[str, int]:
     around, at = divmod(step + further, len(family))
     # Turns +1, -1, +2, ... use successive laps.
     return family[at][0], around + 2 * abs(attractor.turn) - (attractor.turn > 0)
+
+
+# Methods of an identification.
+
+ODD, EVEN = "#d55e00", "#0072b2"
+"""Colours of half cycles that begin at a peak of odd or even number."""
+MEASURED: Final = "#222222"  # Colour of measured values
+NOISE, NOISE_SAID = "#d9d9d9", "95 % of the readings' noise"
+"""Colour and name of the band of the readings' noise."""
+
+
+class Look(NamedTuple):
+    """Name in a legend, colour ``#rrggbb`` and matplotlib dash of a method's line."""
+
+    label: str
+    colour: str
+    dash: str = "-"
+
+
+_LOOKS: Final = {
+    "trajectory": Look("trajectory", "#0072b2"),
+    "combined": Look("combined, as printed", "#d55e00"),
+    "combined_odd_ends": Look("combined, odd ends", "#7a2a00", "-."),
+    "combined_odd_triplets": Look("combined, odd triplets", "#f0a070", ":"),
+    "combined_repaired": Look("combined, repaired", "#009e73", "--"),
+    "log_decrement": Look("log decrement", "#e69f00"),
+    "de_paula": Look("de Paula", "#cc79a7"),
+    "energy_balance": Look("energy balance", "#56b4e9", "--"),
+    "model": Look("model", "#0072b2"),
+    "before": Look("before", "#d55e00"),
+    "baseline": Look("baseline", "#d55e00"),
+    "after": Look("after", "#0072b2"),
+}
+"""Colours of Okabe and Ito for methods drawn together."""
+_OTHER: Final = "#8a8a8a"
+_READINGS: Final = ("combined", "combined_odd_ends", "combined_odd_triplets")
+"""Variants of the printed method; if the first is not applicable, another is drawn instead."""
+
+
+def look(method: str) -> Look:
+    """Return the look of a method; an unknown one is grey under its own name."""
+    return _LOOKS.get(method) or Look(method.replace("_", " "), _OTHER)
+
+
+def drawn(methods: Iterable[str]) -> list[str]:
+    """Return the methods to draw: all but further variants of the printed one."""
+    there = list(methods)
+    printed = [name for name in _READINGS if name in there][:1]
+    return [name for name in there if name not in _READINGS or name in printed]

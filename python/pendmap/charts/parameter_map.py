@@ -13,7 +13,7 @@ from pendmap._core import Attractor
 from pendmap.analysis.cell_search import UNDECIDED
 from pendmap.analysis.orbit_table import attractors_of
 from pendmap.analysis.parameter_map import sets
-from pendmap.charts import names, palette, parameters, plane, tongues
+from pendmap.charts import names, palette, plane, tongues
 from pendmap.charts.legend import colours_of
 from pendmap.charts.marks import Colours, Image, Line, Mark, together
 from pendmap.files import facts
@@ -67,11 +67,8 @@ class Kind:
     @property
     def text(self) -> str:
         """Line of the legend."""
-        return f"{self.name}, {_percent(self.presence)}"
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.1f} %" if share >= 0.001 else "under 0.1 %"  # noqa: PLR2004
+        share = f"{100 * self.presence:.1f} %"
+        return f"{self.name}, {share if self.presence >= 0.001 else 'under 0.1 %'}"  # noqa: PLR2004
 
 
 def kinds(dataset: xr.Dataset) -> list[Kind]:
@@ -137,9 +134,9 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
     fixed = names.parameters(facts(dataset), varied)
     rows, columns = dataset["regime"].shape
     size = f"{columns} × {rows} cells, {int(dataset.attrs['starts'])} starts each"
-    titles = f"Attractors over {parameters.over(varied)}", f"{fixed};   {size}"
+    titles = f"Attractors over {names.over(varied)}", f"{fixed};   {size}"
     every = [*known, *shares]
-    return parameters.layers(dataset, varied, titles, make, every, (leading, others), layer)
+    return names.layers(dataset, varied, titles, make, every, (leading, others), layer)
 
 
 def _image(dataset: xr.Dataset, name: str, across: Ends, up: Ends, cells: int) -> Image:
@@ -170,20 +167,15 @@ def _colours(dataset: xr.Dataset, name: str, values: Floats) -> Colours:
         low, high = min(low, -1e-3, -_LEAST_HALF * high), max(high, 1e-3, -_LEAST_HALF * low)
         # The halves have different scales: without ticks on both, dark blue would appear as far
         # from 0 as dark red.
-        ticks = sorted({at for side in ((low, 0.0), (0.0, high)) for at in _few(*side)})
+        halves = plane.plain_ticks(low, 0.0)[::-2], plane.plain_ticks(0.0, high)[::2]
+        ticks = sorted({at for half in halves for at, _ in half})
         text = f"{text} ({unit}{none})"
         return Colours(text, "RdBu_r", low, high, "centred", "both", ticks)
     if name == "period":
-        return parameters.counts(f"{text} (drive's; grey: none)", values, 1)
+        return names.counts(f"{text} (drive's; grey: none)", values, 1)
     if name in ("attractors", "winding"):
-        return parameters.counts(text, values)
+        return names.counts(text, values)
     return Colours(text, "cividis", 0.0, 1.0)
-
-
-def _few(low: float, high: float) -> list[float]:
-    """Return at most four round ticks in a half of a colour bar."""
-    ticks = [at for at, _ in plane.plain_ticks(low, high)]
-    return ticks[::2] if low == 0.0 or len(ticks) % 2 else ticks[1::2]
 
 
 def _curves(dataset: xr.Dataset) -> list[Mark]:

@@ -20,16 +20,11 @@ if TYPE_CHECKING:
 
 Ticks = list[tuple[float, str]]
 TWO_PI = 2.0 * math.pi
-
 FEWEST, MOST = 2.0, 6.5  # Least and greatest number of tick steps of a range of angles
-
 FURTHEST = 1000  # Multiple of pi beyond which angles have plain numbers as labels
-
 NARROW = 1e-4
 """Width of a window, relative to its distance from 0, below which its ticks have an offset."""
-
 _FINE = 8  # Pixels of the narrowest cell if cells differ in width
-
 MOST_COPIES = 100  # Greatest number of copies of a point, at distances of 2 pi, in a window
 
 
@@ -122,11 +117,10 @@ def ticks(axis: Axis, low: float, high: float, most: int = 8) -> tuple[str, Tick
         sizes = [axis.straight * 10.0**k for k in range(last, -1, -(-(2 * last + 3) // most))]
         listed = [(at, power(at)) for size in sizes for at in (-size, size)] + [(0.0, "0")]
     elif axis.ticks is None:
-        size = axis.factor
-        shift, short = short_ticks(low * size, high * size, angle=axis.scale == "angle")
+        shift, short = short_ticks(low, high, angle=axis.scale == "angle")
         zero = next((k for k, tick in enumerate(short) if tick[1] == "0"), 0)
         every = -(-len(short) // most)
-        listed = [((shift + at) / size, text) for at, text in short[zero % every :: every]]
+        listed = [(shift + at, text) for at, text in short[zero % every :: every]]
         name = shifted(name, shift)
     slack = 1e-9 * (high - low)
     return name, [one for one in listed if low - slack <= one[0] <= high + slack]

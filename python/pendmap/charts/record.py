@@ -53,16 +53,16 @@ def _one(run: Run) -> Chart:
         lines = [*lines[: MOST_LINES - 1], "...  pendmap look has the rest"]
     if run.peaks_only:
         ends = f"{moment(run.time[0])} to {moment(run.time[-1])} s"
-        subtitle, last = f"{run.time.size} turning points, {ends}", _decay(run)
+        subtitle, below = f"{run.time.size} turning points, {ends}", [_intervals(run)]
     else:
         noise = noise_said(noise_floor(run), noise_unit(run)).split(",", maxsplit=1)[0]
         used = f"{run.trusted.sum()} of {run.time.size} samples for fitting"
         subtitle = f"{run.kind}, {run.rate_hz:.5g} Hz, {used};   noise {typographic(noise)}"
-        last = _residuals(run)
+        below = [_intervals(run), _residuals(run)]
     return Chart(
         f"Record {run.name}",
         subtitle,
-        [[_flags(run)], [_history(run)], [_intervals(run), last]],
+        [[_flags(run)], [_history(run)], below],
         heights=(0.15, 1.25, 1.0),
         size=(WIDTH, 6.3 + 0.19 * len(lines)),
         notes=lines,
@@ -147,14 +147,6 @@ def _intervals(run: Run) -> Panel:
     up = Axis("samples", (0.7, 1.5 * steps.size), "log")
     title = "between turning points" if run.peaks_only else "the clock"
     return Panel("clock", title, across, up, [Steps(edges, counts, colour=USED, filled=True)])
-
-
-def _decay(run: Run) -> Panel:
-    size = np.maximum(np.abs(run.theta), 1e-9)
-    clock = Axis("t (s)", (float(run.time[0]), float(run.time[-1])))
-    ends = (float(size.min()) / 1.5, float(size.max()) * 1.5)
-    up = Axis("|θ| (rad)", ends, "log")
-    return Panel("last", "the decay", clock, up, [Points(run.time, size, colour=USED, size=2.5)])
 
 
 def _residuals(run: Run) -> Panel:

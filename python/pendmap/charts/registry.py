@@ -47,28 +47,12 @@ _AXES: Final[dict[str, tuple[str, ...]]] = {
     "trajectory": ("time",),
 }
 """Axes of a chart, rows first, where they are not parameters that a user chose."""
-_DIMENSIONS: Final[dict[str, dict[str, tuple[str, ...]]]] = {
-    "basin_sweep": {"twin": ("attractor",), "point_theta": ("point",)},
-    "basins": {"fraction": ("attractor",)},
-    "bifurcation": {"kind": ("kind",), "entry_kind": ("entry",), "point_value": ("point",)},
-    "lifetime": {"captured": ("attractor", "elapsed"), "tail_mean": ("tail_begin",)},
-    "lyapunov": {"growth": ("elapsed",), "kind": ("attractor",)},
-    "melnikov": {"p_melnikov": ("omega", "branch")},
-    "orbits": {"kind": ("orbit",), "point_theta": ("point",)},
-    "parameter_map": {"kind": ("kind",), "regime_has": ("set", "kind")},
-    "tongues": {"p": ("critical",), "asymptotic": ("curve", "omega")},
-    "trajectory": {"theta": ("time",), "section_time": ("period",)},
+_TABLES: Final = {
+    "basins": (("label", "id", "attractor"),),
+    "bifurcation": (("up", "entry", "entry"), ("entry_kind", "kind", "kind")),
+    "parameter_map": (("regime", "set", "set"), ("entry_kind", "kind", "kind")),
 }
-"""Dimensions that variables must have in every selection of a result."""
-_CELLS: Final = {
-    "basin_sweep": "label",
-    "basins": "label",
-    "bifurcation": "up",
-    "parameter_map": "regime",
-}
-"""The variable over the axes."""
-_NUMBERS: Final = {"label": "id", "regime": "set", "entry_kind": "kind", "up": "entry"}
-"""Variables that number the rows of a table, and the column of these numbers or of names."""
+"""Variables that number the rows of a table, the column of these numbers or of names, the table."""
 _OF_THE_WHOLE: Final = (
     "mean_settle",
     "longest_settle",
@@ -137,7 +121,6 @@ def _axes(dataset: xr.Dataset) -> tuple[str, ...]:
 
 def _check(dataset: xr.Dataset, axes: tuple[str, ...]) -> None:
     """Raise InputError for a selection of anything but ranges of the axes."""
-    kind = dataset.attrs["kind"]
     for name in axes:
         if name not in dataset.dims:
             raise InputError(
@@ -146,25 +129,16 @@ def _check(dataset: xr.Dataset, axes: tuple[str, ...]) -> None:
             )
         if not dataset.sizes[name]:
             raise InputError(f"{name} must have one value at least in a selection, got none")
-    over = _DIMENSIONS.get(kind, {}) | ({_CELLS[kind]: axes} if kind in _CELLS else {})
-    for name, dimensions in over.items():
-        if name not in dataset or set(dataset[name].dims) != set(dimensions):
-            there = "is missing"
-            if name in dataset:
-                there = f"is over {', '.join(map(str, dataset[name].dims)) or 'nothing'}"
-            raise InputError(
-                f"{name} must be over {', '.join(dimensions)} here, as isel and sel of ranges"
-                f" leave it, but {there}"
-            )
-    for variable, column in _NUMBERS.items():
-        if kind not in _CELLS or variable not in dataset or column not in dataset:
-            continue
-        number, rows = np.unique(dataset[variable].values), dataset[column].values
-        place = np.arange(rows.size)
-        numbered = column == "id" or rows.dtype.kind == "U" or (rows == place).all()
-        known = rows if column == "id" else place
-        if not numbered or not np.isin(number[number >= (column == "id")], known).all():
-            table = dataset[column].dims[0]
+    for variable, column, table in _TABLES.get(dataset.attrs["kind"], ()):
+        whole = column in dataset and dataset[column].dims == (table,)
+        if whole:
+            number, rows = np.unique(dataset[variable].values), dataset[column].values
+            place = np.arange(rows.size)
+            known = rows if column == "id" else place
+            there = np.isin(number[number >= (column == "id")], known)
+            ordered = column in {"id", "kind"} or np.array_equal(rows, place)
+            whole = ordered and bool(there.all())
+        if not whole:
             raise InputError(
                 f"{table}: a selection of it cannot be drawn; it must be one of an axis"
             )
@@ -222,10 +196,9 @@ def build(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
 
     It has one ``layer`` alone if one is asked for; images have at most ``cells`` along a side.
     """
-    builder = _builder(dataset.attrs["kind"])
-    if builder is None:
-        raise InputError(f"no chart of kind {dataset.attrs['kind']!r}")
-    return builder(dataset, layer=layer, cells=cells)
+    make: Any = _builder(dataset.attrs["kind"])
+    chart: Chart = make(dataset, layer=layer, cells=cells)
+    return chart
 
 
 def of_result(

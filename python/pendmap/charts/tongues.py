@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from pendmap.analysis.critical_curves import PLANES, in_plane, window
+from pendmap.analysis.critical_curves import in_plane, window
 from pendmap.analysis.tongues import NEAR
 from pendmap.charts import names
 from pendmap.charts.chart import Axis, Chart, Panel
 from pendmap.charts.marks import QUIET, Areas, Line, Mark, Points, Text, this_pendulum, together
-from pendmap.errors import InputError
 from pendmap.files import facts
 from pendmap.formatting import typographic
 
@@ -40,9 +39,7 @@ _PLANES: Final = {
     "e-alpha2": ("paper", "α² = 1/ω²", "e = p/ω² = Y/l"),
 }
 """Path in a recording, and names of the axes, of each plane."""
-
 _PARTED = 0.3  # Error above which an asymptotic curve is not drawn
-
 _JUMP = 0.6  # Largest change of p along a line from point to point, over the mean p plus 0.3
 _FAR: Final = 1e6  # Cost of joining points that lie on different curves
 
@@ -57,9 +54,7 @@ def chart(
 ) -> Chart:
     """Return the critical curves in both planes; a figure shows one of them."""
     del cells
-    first = layer or str(dataset.attrs.get("plane", PLANES[0]))
-    if first not in PLANES:
-        raise InputError(f"layer must be one of {', '.join(PLANES)}, got {first!r}")
+    first = str(dataset.attrs.get("plane"))
     order = sorted(_PLANES, key=lambda plane: plane != first)
     panels = [_panel(dataset, plane, marks) for plane in order]
     return Chart(
@@ -69,7 +64,7 @@ def chart(
         recorded=panels,
         ratio=0.72,
         tabs=True,
-    )
+    ).only(layer)
 
 
 def _panel(dataset: xr.Dataset, plane: str, marks: Sequence[tuple[float, float, str]]) -> Panel:

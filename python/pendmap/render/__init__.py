@@ -82,15 +82,8 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
     path : str or path
         The file to write, ``.png``, ``.svg`` or ``.pdf``; an existing one is replaced.
     layer : str, optional
-        Part to draw alone, large: ``labels``, ``settle``, ``turns`` or ``exponent`` of a map,
-        over draws also ``probability`` and ``entropy``; ``history``, ``energy``, ``phase`` or
-        ``section`` of a trajectory; ``growth``, ``average`` or ``distribution`` of an exponent;
-        ``survival`` or ``tail`` of a lifetime; ``theta``, ``velocity`` or ``sweeps`` of a
-        bifurcation; of critical curves the plane: ``omega-p`` or ``e-alpha2``; of a map
-        ``kinds``, ``exponent``, ``attractors``, ``period``, ``winding``, ``undecided``, over draws
-        ``certainty``, or ``share KIND``; of a sweep ``fraction``, ``entropy``, ``uncertainty``,
-        over two parameters ``boundary`` and ``main``. An unknown one is answered with those of the
-        result.
+        Part to draw alone, large, like ``settle`` of a map or ``phase`` of a trajectory; an unknown
+        one is answered with those of the result.
     size : (float, float), optional
         Width and height in inches, like ``8x4`` in a command; by default what the parts need.
     width : float, optional

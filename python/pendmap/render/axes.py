@@ -128,12 +128,10 @@ def _panel(
     names: Mapping[str, str] | None,
 ) -> Panel:
     """Return one part of a result, by default the leading one."""
-    if layer is None:
-        layer = _FIRST.get(type(result).__name__)
-        if layer == "history" and len(getattr(result, "runs", [])) > 1:
-            layer = "0"
     # Alone a part has no names that the other parts explain.
-    layer = layer or registry.of_result(result).panels[0].name
+    known = [] if layer else [panel.name for panel in registry.of_result(result).panels]
+    first = _FIRST.get(type(result).__name__)
+    layer = layer or (first if first in known else known[0])
     chart = registry.of_result(result, layer=layer, colours=colours, names=names)
     if colormap is not None:
         chart = drawing.in_colours(chart, colormap)

@@ -32,7 +32,7 @@ WIDE, ALONE, STACKED = 4.1, 5.2, 7.0
 BESIDE, BAR, BELOW, HEAD, ROW = 0.75, 0.75, 0.75, 0.7, 0.19
 """Inches for labels beside a panel, a colour bar, labels below, a title, a row of a legend."""
 LEFT: Final = 0.1  # Left margin of titles, inches
-SMALL: Final = 0.8  # Share of the usual size below which texts are smaller
+SMALL: Final = 0.7  # Share of the usual size below which texts are smaller
 LETTERS: Final = "abcdefghijklmnopqrstuvwxyz"
 
 

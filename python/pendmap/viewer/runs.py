@@ -12,7 +12,7 @@ import rerun.blueprint as rrb
 
 from pendmap.charts import names, palette, registry
 from pendmap.charts.identification import simulated
-from pendmap.charts.methods import look
+from pendmap.charts.palette import look
 from pendmap.comparison import Comparison
 from pendmap.comparison.experiment import in_short
 from pendmap.diagnosis import Discrepancy
@@ -20,10 +20,9 @@ from pendmap.diagnosis.result import as_text as diagnosis_text
 from pendmap.formatting import MINUS
 from pendmap.identification import IdentificationReport
 from pendmap.identification.report import as_text as identification_text
-from pendmap.viewer import chart, moving, recording
+from pendmap.viewer import chart, recording
 from pendmap.viewer.marks import plain
-from pendmap.viewer.moving import Look
-from pendmap.viewer.recording import INK
+from pendmap.viewer.recording import INK, Look
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -75,7 +74,7 @@ def contents(result: Any) -> dict[str, Any]:  # noqa: ANN401 (of several types)
     """Return layout, contents and name of the recording of what was found in records."""
     shown = registry.of_result(result)
     drawn, text, every = chart.drawings(shown), summary(result), motions(result)
-    moving.refuse_late(shown.title, (one.time for one in every))
+    recording.refuse_late(shown.title, (one.time for one in every))
     tabs = [container(f"run_{k}", one) for k, one in enumerate(every, 1)]
     tabs += [one.container for one in drawn]
 
@@ -207,9 +206,9 @@ def container(root: str, one: Motion) -> rrb.Container:
 
 def log(stream: rr.RecordingStream, root: str, one: Motion) -> None:
     """Log one run: angles, residuals with the noise, and pendulums side by side."""
-    moving.series(stream, f"{root}/angle/record", one.time, one.record, RECORD)
+    recording.series(stream, f"{root}/angle/record", one.time, one.record, RECORD)
     path = f"{root}/pendulum"
-    stream.log(f"{path}/data", moving.UPWARD, static=True)
+    stream.log(f"{path}/data", recording.UPWARD, static=True)
     pivots = [APART * place for place in range(1 + len(one.models))]
     spots = rr.Points2D([[x, 0.0] for x in pivots], colors=[INK], radii=rr.Radius.ui_points(3.0))
     stream.log(f"{path}/axes/pivots", spots, static=True)
@@ -219,21 +218,21 @@ def log(stream: rr.RecordingStream, root: str, one: Motion) -> None:
     _pendulum(stream, f"{path}/data/record", (one.time, one.record), RECORD, 0.0)
     for pivot, (shade, time, theta) in zip(pivots[1:], one.models, strict=True):
         leaf = f"{path}/data/{shade.name}"
-        moving.series(stream, f"{root}/angle/{shade.name}", time, theta, shade)
+        recording.series(stream, f"{root}/angle/{shade.name}", time, theta, shade)
         _pendulum(stream, f"{leaf}/record", (one.time, one.record), RECORD, pivot)
         _pendulum(stream, leaf, (time, theta), shade, pivot)
     for shade, residual in one.residuals():
         rms = MILLI * math.sqrt(float(np.nanmean(residual**2)))
         leaf = shade.name if len(one.models) > 1 else "residual"
         named_look = replace(shade, size=1.2, name=f"{shade.name}, {rms:.3g} mrad rms")
-        moving.series(stream, f"{root}/residual/{leaf}", one.time, MILLI * residual, named_look)
+        recording.series(stream, f"{root}/residual/{leaf}", one.time, MILLI * residual, named_look)
     if not (one.rms and one.sigma):
         return
     size = MILLI * BAND * one.sigma
     for leaf, sign, mark in (("above", 1.0, "+"), ("below", -1.0, MINUS)):
         name = f"{mark}{BAND:g} σ of the noise, {mark}{size:.3g} mrad"
         lines = np.full(2, sign * size), Look(INK, 1.5, name=name)
-        moving.series(stream, f"{root}/residual/{leaf}", one.time[[0, -1]], *lines)
+        recording.series(stream, f"{root}/residual/{leaf}", one.time[[0, -1]], *lines)
 
 
 def _pendulum(
@@ -245,5 +244,5 @@ def _pendulum(
     at = np.stack([pivot + np.sin(theta), -np.cos(theta)], axis=1)[known]
     arms = np.stack([np.broadcast_to((pivot, 0.0), at.shape), at], axis=1)
     arm, bob = (0.8, 4.0) if shade is RECORD and pivot else (3.0, 10.0)
-    moving.strips(stream, f"{path}/arm", time[known], arms, replace(shade, size=arm))
-    moving.points(stream, f"{path}/bob", time[known], at, replace(shade, size=bob, order=2.0))
+    recording.strips(stream, f"{path}/arm", time[known], arms, replace(shade, size=arm))
+    recording.points(stream, f"{path}/bob", time[known], at, replace(shade, size=bob, order=2.0))
