@@ -291,7 +291,8 @@ def coefficients(result: Discrepancy, shown: str) -> Panel:
     reach = 6 * float(np.median(error[known])) if known.any() else 0.0
     least, most = value - Z95 * error, value + Z95 * error
     sure = known & (error < reach)
-    low, high = holding(together, least[sure], most[sure], margin=0.2)
+    around = 10.0**-power * mean + np.array([-reach, reach])
+    low, high = holding(together, around, least[sure], most[sure])
     marks: list[Mark] = [
         Span(together, axis="y", colour=NOISE, name="all together"),
         Line(*bars(at[known], least[known], most[known]), colour=AFTER, width=1.0),

@@ -72,12 +72,9 @@ def sheet(
     )
 
 
-# Decay of each model with the measured one: figure 6.
-
-
 @dataclasses.dataclass(frozen=True)
 class Decay:
-    """A model simulated from the first peak of a record, with the sensor's zero error: s, rad."""
+    """A model simulated from the first peak of a record (figure 6), with the zero error."""
 
     peak_time: Floats
     peak: Floats
@@ -184,9 +181,6 @@ def residuals(run: Run, residual: Floats, sigma: float, method: str, title: str)
     return Panel("residual", title, names.seconds(run.time), Axis(unit, (-top, top)), marks)
 
 
-# Error of each simulated period and peak: figure 7.
-
-
 def errors(report: IdentificationReport) -> Chart:
     """Return the errors of periods and peaks of every model."""
     title, known = "Errors of simulated periods and peaks", report.table.errors
@@ -221,9 +215,6 @@ def error_panels(
         mine = [_line(*curve, method, 1.1) for method, curve in zip(known, curves, strict=True)]
         panels.append(Panel("errors", title, across, up, [*noise, *mine, *lines]))
     return panels
-
-
-# Table 1.
 
 
 def table(report: IdentificationReport) -> Chart:

@@ -24,6 +24,7 @@ FEWEST, MOST = 2.0, 6.5  # Least and greatest number of tick steps of a range of
 FURTHEST = 1000  # Multiple of pi beyond which angles have plain numbers as labels
 NARROW = 1e-4
 """Width of a window, relative to its distance from 0, below which its ticks have an offset."""
+CLOSEST = 0.8  # Least distance of ticks of a logarithmic axis, over that of as many as have room
 _FINE = 8  # Pixels of the narrowest cell if cells differ in width
 MOST_COPIES = 100  # Greatest number of copies of a point, at distances of 2 pi, in a window
 
@@ -114,7 +115,7 @@ def ticks(axis: Axis, low: float, high: float, most: int = 8) -> tuple[str, Tick
         listed = [(at, power(at)) for at in log_ticks(low, high, most)]
     elif axis.ticks is None and axis.scale == "signed":
         last = max(0, math.floor(math.log10(max(-low, high) / axis.straight)))
-        sizes = [axis.straight * 10.0**k for k in range(last, -1, -(-(2 * last + 3) // most))]
+        sizes = [axis.straight * 10.0**k for k in range(last, -1, -(2 * last + 3) // most)]
         listed = [(at, power(at)) for size in sizes for at in (-size, size)] + [(0.0, "0")]
     elif axis.ticks is None:
         shift, short = short_ticks(low, high, angle=axis.scale == "angle")
@@ -156,7 +157,8 @@ def log_ticks(low: float, high: float, most: int = 8) -> list[float]:
     for steps in (range(1, 10), (1, 2, 5), (1, 3), (1,)):
         every = (m * 10.0**k for k in powers for m in steps)
         listed = [at for at in every if low * 0.999 <= at <= high * 1.001]
-        if len(listed) <= most:
+        gap = np.min(np.diff(np.log10(listed)), initial=math.inf)
+        if most * gap >= CLOSEST * math.log10(high / low):
             break
     if len(listed) < 2:  # noqa: PLR2004 (a scale)
         return sorted({float(round(x)) for x in np.linspace(low, high, 5)})

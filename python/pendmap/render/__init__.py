@@ -82,8 +82,13 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
     path : str or path
         The file to write, ``.png``, ``.svg`` or ``.pdf``; an existing one is replaced.
     layer : str, optional
-        Part to draw alone, large, like ``settle`` of a map or ``phase`` of a trajectory; an unknown
-        one is answered with those of the result.
+        Part to draw alone, large; an unknown one is answered with those of the result. Of a map
+        ``labels``, ``settle``, ``turns``, ``exponent``, ``probability``, ``entropy``; a trajectory
+        ``history``, ``energy``, ``phase``, ``section``; an exponent ``growth``, ``average``,
+        ``distribution``; a lifetime ``survival``, ``tail``; a diagram ``theta``, ``velocity``,
+        ``sweeps``; critical curves ``omega-p``, ``e-alpha2``; a map over parameters ``kinds``,
+        ``exponent``, ``attractors``, ``period``, ``winding``, ``undecided``, ``certainty``, ``share
+        KIND``; a sweep ``fraction``, ``entropy``, ``uncertainty``, ``boundary``, ``main``.
     size : (float, float), optional
         Width and height in inches, like ``8x4`` in a command; by default what the parts need.
     width : float, optional

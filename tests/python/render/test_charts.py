@@ -13,10 +13,9 @@ import pendmap
 from drawn import made, named, written
 from pendmap import InputError, render, viewer
 from pendmap.charts import chart as charts
-from pendmap.charts import marks, registry
+from pendmap.charts import marks, plane, registry
 from pendmap.viewer.chart import drawings
-from pendmap.viewer.marks import PALE
-from pendmap.viewer.place import Place, scaled
+from pendmap.viewer.marks import PALE, Place, scaled, unscaled
 from recordings import recorded
 
 if TYPE_CHECKING:
@@ -144,6 +143,10 @@ def test_axes_that_are_logarithmic_on_both_sides_of_0_have_ticks() -> None:
     assert Place.of(panel, 1.0).x == pytest.approx((-3.0, 4.0))
     at = scaled(axis, [-1.0, -0.01, -0.005, 0.0, 0.1])
     assert at == pytest.approx([-3.0, -1.0, -0.5, 0.0, 2.0])
+    assert unscaled(axis, at) == pytest.approx([-1.0, -0.01, -0.005, 0.0, 0.1])
+    name, ticks = plane.ticks(axis, -1.0, 10.0)
+    assert name == axis.name
+    assert [text for _, text in ticks].count("0") == 1
 
 
 def test_without_a_builder_there_is_no_figure_and_no_recording(tmp_path: Path) -> None:

@@ -118,7 +118,7 @@ def test_a_single_chaotic_attractor_shows_turns_exponent_and_its_points() -> Non
         "finite-time exponent over 4 periods",
         "its attractor, once a period",
     ]
-    assert named(figure) == ["tumbling chaos, 100 % of the starts"]
+    assert named(figure) == ["tumbling chaos, 100 %"]
     turns = figure.axes[0].images[-1]
     low, high = turns.get_clim()
     assert low == -(high or 0.0) < 0.0

@@ -21,8 +21,6 @@ MAPS = {
     "usual": synthetic.painted(),
     "one": synthetic.painted(synthetic.USUAL[:1], (1, 1)),
     "none": synthetic.painted((), (6, 5)),
-    "three by two": synthetic.painted(synthetic.USUAL[:2], (3, 2)),
-    "twelve": synthetic.painted(synthetic.USUAL, (60, 60), undecided=200, failed=100),
     "twelve unreliable": synthetic.painted(synthetic.USUAL, (60, 60), **synthetic.UNRELIABLE),
     "wide": synthetic.painted(theta=(-4 * math.pi, 4 * math.pi), velocity=(-2.0, 2.0)),
     "flat unreliable": synthetic.painted(**FLAT, **synthetic.UNRELIABLE),
@@ -35,11 +33,9 @@ MAPS = {
 SHRUNK = {
     "usual": synthetic.painted(),
     "unreliable": synthetic.painted(**synthetic.UNRELIABLE),
-    "torque": synthetic.painted(velocity=(-10.0, 10.0), p=0.0, torque=0.5),
     "thin": synthetic.painted(theta=(0.0, 1e-12), velocity=(-1.0, 1.0), **synthetic.UNRELIABLE),
     "far": synthetic.painted(theta=(1e6, 1e6 + 1.0), velocity=(-1.0, 1.0)),
     "huge": synthetic.painted(theta=(1e300, 2e300), velocity=(-1.0, 1.0)),
-    "flat": synthetic.painted(theta=(-10.0, 10.0), velocity=(-2.0, 2.0), **synthetic.UNRELIABLE),
     "chaos": motions.chaotic(cells=16, periods=3),
 }
 
@@ -91,5 +87,5 @@ def test_indistinguishable_copies_are_left_out() -> None:
 
 def test_the_title_names_no_settling_without_attractors() -> None:
     result = pendmap.basins(pendmap.Pendulum(), pendmap.Grid.square(8), max_periods=1)
-    assert layers.what(result, "turns") == "net turns after 1 period"
+    assert layers.text_of(result, layers.LAYERS["turns"].title) == "net turns after 1 period"
     assert result.net_turns.attrs["long_name"] == "net turns after 1 period"

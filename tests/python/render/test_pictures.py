@@ -11,6 +11,7 @@ import xarray as xr
 import motions
 import synthetic
 from pendmap.charts import basins, legend, plane
+from pendmap.charts.chart import Axis
 
 
 def test_a_pixel_shows_the_cell_at_its_centre() -> None:
@@ -53,18 +54,32 @@ def test_angles_of_any_size_are_wrapped() -> None:
     ("window", "labels"),
     [
         ((-math.pi, math.pi), "-π -π/2 0 π/2 π"),
-        ((0, 2 * math.pi), "0 π/2 π 3π/2 2π"),
         ((-math.pi / 2, math.pi / 2), "-π/2 -π/4 0 π/4 π/2"),
         ((-4 * math.pi, 4 * math.pi), "-4π -2π 0 2π 4π"),
         ((0.1, 0.2), "0.1 0.12 0.14 0.16 0.18 0.2"),
     ],
 )
-def test_angle_ticks_depend_on_the_width_of_the_window(
+def test_ticks_of_angles_depend_on_the_width_of_the_window(
     window: tuple[float, float], labels: str
 ) -> None:
-    ticks = plane.angle_ticks(*window)
+    _, ticks = plane.ticks(Axis("θ", scale="angle"), *window)
     assert " ".join(label for _, label in ticks) == labels.replace("-", "\N{MINUS SIGN}")
-    assert all(window[0] - 1e-9 <= at <= window[1] + 1e-9 for at, _ in ticks)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "most", "labels"),
+    [
+        (1.0, 135.0, 8, "1 2 5 10 20 50 100"),
+        (1.0, 135.0, 5, "1 3 10 30 100"),
+        (5.0, 9.0, 8, "5 6 7 8 9"),
+        (1e-8, 1e3, 4, "$10^{-8}$ $10^{-5}$ 0.01 10"),
+    ],
+)
+def test_ticks_of_a_logarithmic_axis_have_room(
+    low: float, high: float, most: int, labels: str
+) -> None:
+    _, ticks = plane.ticks(Axis("n", scale="log"), low, high, most)
+    assert " ".join(label for _, label in ticks) == labels
 
 
 @pytest.mark.parametrize(

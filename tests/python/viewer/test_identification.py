@@ -13,7 +13,7 @@ import decays
 import pendmap
 from pendmap import viewer
 from pendmap.charts.identification import sheet
-from pendmap.charts.methods import drawn, look
+from pendmap.charts.palette import drawn, look
 from pendmap.identification import identify
 from pendmap.identification.report import as_text
 from pendmap.viewer import runs, window
@@ -119,7 +119,7 @@ def test_every_panel_of_the_figure_is_in_the_recording(
 def test_runs_have_separate_views(tmp_path: Path) -> None:
     lines = []
     for number in (1, 2):
-        write(tmp_path / f"run_{number}.csv", *swings(number, seconds=8.0 + number))
+        write(tmp_path / f"run_{number}.csv", *swings(number, seconds=4.0 + number))
         lines += ["[[run]]", f'file = "run_{number}.csv"']
     (tmp_path / "experiment.toml").write_text("\n".join(lines) + "\n")
     report = identified(tmp_path, "trajectory")
@@ -133,14 +133,15 @@ def test_runs_have_separate_views(tmp_path: Path) -> None:
 def test_long_records_are_thinned(
     report: IdentificationReport, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(runs, "INSTANTS", 650)
-    (one,) = runs.of_identification(report)
-    assert np.array_equal(one.time, report.run.time[::2])
-    assert np.array_equal(one.record, report.run.theta[::2])
-    monkeypatch.setattr(runs, "INSTANTS", 10)
-    (one,) = runs.of_identification(report)
     swing = 2 * np.pi / report.model.w0
-    assert np.max(np.diff(one.time)) <= swing / runs.PER_SWING
+    for instants in (650, 10):
+        monkeypatch.setattr(runs, "INSTANTS", instants)
+        (one,) = runs.of_identification(report)
+        every = round((one.time[1] - one.time[0]) / 0.02)
+        assert every > 1
+        assert np.array_equal(one.time, report.run.time[::every])
+        assert np.array_equal(one.record, report.run.theta[::every])
+        assert np.max(np.diff(one.time)) <= swing / runs.PER_SWING
 
 
 def test_nothing_is_drawn_across_a_gap(tmp_path: Path) -> None:

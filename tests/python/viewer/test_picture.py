@@ -21,7 +21,7 @@ import pendmap
 import synthetic
 from pendmap import viewer
 from pendmap._core import Attractor
-from pendmap.charts import methods, palette
+from pendmap.charts import palette
 from pendmap.identification import identify
 from pendmap.viewer import runs, window
 from recordings import ReadBack
@@ -97,7 +97,7 @@ def test_the_viewers_own_picture_of_an_identification(tmp_path: Path) -> None:
     report = identify(pendmap.read_experiment(record))
     file = viewer.record(report, tmp_path / "a.rrd")
     shares = shares_of_colours(file, tmp_path, 5.0)
-    for shade in (runs.RECORD.colour, palette.parts(methods.look("model").colour)):
+    for shade in (runs.RECORD.colour, palette.parts(palette.look("model").colour)):
         assert shares.get(shade, 0.0) > 2e-4
 
 
