@@ -66,7 +66,7 @@ _OF_THE_WHOLE: Final = (
 
 
 def _builder(kind: object) -> Callable[..., Chart] | None:
-    if kind not in _MODULES:
+    if str(kind) not in _MODULES:
         return BUILDERS.get(str(kind))
     return getattr(importlib.import_module(f"pendmap.charts.{kind}"), "chart", None)
 
@@ -114,9 +114,8 @@ def _axes(dataset: xr.Dataset) -> tuple[str, ...]:
     if kind == "parameter_map":
         return str(attrs["rows"]), str(attrs["columns"])
     varied = tuple(str(attrs.get("varied", "")).split())
-    return {"bifurcation": varied, "basin_sweep": (*varied, "velocity", "theta"), **_AXES}.get(
-        kind, ()
-    )
+    known = {"bifurcation": varied, "basin_sweep": (*varied, "velocity", "theta"), **_AXES}
+    return known.get(kind, ())
 
 
 def _check(dataset: xr.Dataset, axes: tuple[str, ...]) -> None:

@@ -41,13 +41,6 @@ def test_shares_are_stacked_to_one() -> None:
             np.testing.assert_allclose(bands[told], LINE.fraction.values[:, k], atol=1e-12)
 
 
-def test_a_selection_keeps_its_own_values() -> None:
-    bands = widths(LINE.isel(p=slice(7, 2, -2)))
-    every = widths(LINE)
-    for name, share in bands.items():
-        np.testing.assert_allclose(share, every[name][[3, 5, 7]])
-
-
 def test_attractors_of_equal_names_have_different_colours() -> None:
     found = LINE.copy()
     names = np.array([f"oscillation 6:0 from p = {k}" for k in range(found.sizes["attractor"])])

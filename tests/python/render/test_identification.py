@@ -164,11 +164,6 @@ def test_only_methods_that_apply_are_drawn() -> None:
     assert palette.drawn(["combined_odd_ends", "de_paula"])[0] == "combined_odd_ends"
 
 
-def test_colours_of_methods_differ() -> None:
-    looks = [palette.look(name) for name in report("whole").methods]
-    assert len({one.colour for one in looks}) == len({one.label for one in looks}) == len(looks)
-
-
 def test_the_table_has_the_estimates() -> None:
     found = report("whole")
     (table, *_) = identification.table(found).panels[0].marks

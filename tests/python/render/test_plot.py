@@ -122,17 +122,6 @@ def test_a_figure_can_be_pickled() -> None:
     assert [axes.get_title() for axes in again.axes] == [axes.get_title() for axes in figure.axes]
 
 
-@pytest.mark.parametrize("layout", ["constrained", "tight", None])
-def test_a_legend_is_kept_by_layouts_of_the_user(layout: str | None) -> None:
-    figure, every = plt.subplots(2, 2, figsize=(9.0, 7.0), layout=layout)
-    for axes in every.flat:
-        plot(MOTION, axes, layer="phase")
-        plot(MAP, axes, layer="settle", legend=True)
-    figure.canvas.draw()
-    assert all(axes.get_tightbbox().y0 >= 0 for axes in every.flat)
-    assert not figure.legends
-
-
 @pytest.mark.parametrize("name", RESULTS)
 def test_recorded_curves_of_a_panel_have_names_and_colours_of_their_own(name: str) -> None:
     chart = registry.of_result(result(name))
@@ -175,14 +164,6 @@ def test_a_map_of_a_sweep_looks_like_the_map_alone() -> None:
             for member in (registry.ready(swept.sel(p=p)), alone)
         ]
         assert looks[1] <= looks[0] or looks[0] <= looks[1], looks
-
-
-def test_a_panel_has_the_limits_ticks_and_names_of_the_figure() -> None:
-    axes = plot(MOTION, layer="phase")
-    assert axes.get_xlim() == pytest.approx((-np.pi, np.pi))
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("$θ$ (rad)", "$dθ/dτ$")
-    curve = axes.lines[0].get_xydata()
-    assert np.isin(np.round(MOTION["velocity"].values[:5], 12), np.round(curve[:, 1], 12)).all()
 
 
 def test_title_and_legend_are_optional() -> None:

@@ -48,7 +48,9 @@ def test_a_trajectory_is_read_back(back: ReadBack, swing: xr.Dataset) -> None:
     points = back.rows("/poincare/data/points", "Points2D:positions")
     assert np.allclose(points[:, 0], swing["section_theta"].values, atol=1e-6)
     assert back.columns["/poincare/data/points"]["period"] == list(range(13))
-    assert {"/pendulum/data/trail", "/phase/data/curve", "/summary"} <= set(back.columns)
+    curve = np.array(back.one("/phase/data/curve", "LineStrips2D:strips"))
+    assert np.isnan(curve[:, 0]).any(), "this trajectory tumbles"
+    assert np.nanmax(np.abs(np.diff(curve[:, 0]))) < 1.0, "no line crosses the plane"
 
 
 def test_the_pendulum_hangs_on_its_pivot(back: ReadBack, swing: xr.Dataset) -> None:
@@ -57,6 +59,9 @@ def test_the_pendulum_hangs_on_its_pivot(back: ReadBack, swing: xr.Dataset) -> N
     arm = back.rows("/pendulum/data/arm", "LineStrips2D:strips")
     assert np.allclose(np.hypot(*(bob - pivot).T), 1.0, atol=1e-5)
     assert np.allclose(arm, np.stack([pivot, bob], axis=1))
+    trail = back.rows("/pendulum/data/trail", "LineStrips2D:strips")
+    assert np.allclose(trail[:, -1], bob)
+    assert np.allclose(trail[150, -2], bob[145]), "every fifth of 200 samples of a period"
     hanging = np.arctan2((bob - pivot)[:, 0], -(bob - pivot)[:, 1])
     assert np.allclose(np.cos(hanging - swing["theta"].values), 1.0, atol=1e-6)
 
@@ -70,22 +75,6 @@ def test_the_pivot_s_acceleration_is_that_of_the_equation(
     acceleration = np.diff(height[::every], 2) / (every * h) ** 2
     drive = 1.7 * np.cos(0.87 * swing["time"].values[::every][1:-1])
     assert np.allclose(acceleration, drive, atol=0.06)
-
-
-def test_the_curve_does_not_cross_the_plane(back: ReadBack) -> None:
-    curve = np.array(back.one("/phase/data/curve", "LineStrips2D:strips"))
-    assert np.isnan(curve[:, 0]).any(), "this trajectory tumbles"
-    assert np.nanmax(np.abs(np.diff(curve[:, 0]))) < 1.0
-
-
-def test_the_trail_ends_at_the_bob(back: ReadBack) -> None:
-    trail = back.rows("/pendulum/data/trail", "LineStrips2D:strips")
-    bob = back.rows("/pendulum/data/bob", "Points2D:positions")
-    assert np.allclose(trail[:, -1], bob)
-    assert np.allclose(trail[150, -2], bob[145]), (
-        "every fifth of 200 samples: one period, 40 points"
-    )
-    assert np.allclose(trail[0], bob[0])
 
 
 @pytest.mark.parametrize("periods", [0, 1])
