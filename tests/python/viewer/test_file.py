@@ -10,27 +10,12 @@ import xarray as xr
 
 import synthetic
 from pendmap import InputError, viewer
-from pendmap.viewer import chart
 from recordings import recorded
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 pytestmark = pytest.mark.usefixtures("strict_recordings")
-
-
-def test_a_recording_is_complete_or_absent(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    file = tmp_path / "a.rrd"
-    file.write_bytes(b"old")
-
-    def interrupted(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(chart, "log", interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        viewer.record(synthetic.painted(), file)
-    assert file.read_bytes() == b"old"
-    assert list(tmp_path.iterdir()) == [file]
 
 
 @pytest.mark.parametrize(

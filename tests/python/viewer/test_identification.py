@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -133,17 +132,6 @@ def test_nothing_is_drawn_across_a_gap(tmp_path: Path) -> None:
     assert np.isfinite(hanging(back, "/run_1/pendulum/data/record/bob", 0.0)).all()
 
 
-def test_unused_samples_have_no_residual(report: IdentificationReport, tmp_path: Path) -> None:
-    out = np.zeros(report.run.time.size, bool)
-    out[100:110] = True
-    run = dataclasses.replace(report.run, trusted=~out)
-    assert report.joint is not None
-    joint = dataclasses.replace(report.joint, runs=(run,))
-    some = dataclasses.replace(report, run=run, joint=joint)
-    back = ReadBack(viewer.record(some, tmp_path / "a.rrd"))
-    assert np.array_equal(np.isnan(scalars(back, "/run_1/residual/residual")), out)
-
-
 def test_without_a_fit_the_best_model_is_simulated(tmp_path: Path) -> None:
     report = identified(write(tmp_path / "a.csv", *swings(seconds=70.0)), "combined_repaired")
     assert report.joint is None
@@ -155,16 +143,6 @@ def test_without_a_fit_the_best_model_is_simulated(tmp_path: Path) -> None:
     time, model = (read(back, "/run_1/angle/model") for read in (ReadBack.seconds, scalars))
     assert np.abs(model - made.angle(time - first.time[0]) - best["offset"]).max() < 1e-5
     assert "/run_1/residual" not in back.views
-
-
-def test_a_record_of_peaks_alone(tmp_path: Path) -> None:
-    made = decays.decay(release=2.0)
-    file = write(tmp_path / "peaks.csv", made.peak_time[:-1], made.peak[:-1], "peak_rad")
-    report = identified(file)
-    back = ReadBack(viewer.record(report, tmp_path / "a.rrd"))
-    assert np.allclose(scalars(back, "/run_1/angle/record"), made.peak[:-1], atol=1e-8)
-    time = back.seconds("/run_1/angle/model")
-    assert np.allclose(scalars(back, "/run_1/angle/model"), made.angle(time), atol=0.2)
 
 
 def test_where_no_method_can_be_applied_the_record_is_shown(tmp_path: Path) -> None:

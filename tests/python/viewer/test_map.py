@@ -10,7 +10,6 @@ import pytest
 import motions
 import synthetic
 from pendmap.charts import basins, legend, palette, plane
-from pendmap.viewer import chart
 from pendmap.viewer.chart import drawings
 from recordings import ReadBack, recorded
 
@@ -148,16 +147,3 @@ def test_a_failed_exponent_is_covered(tmp_path: Path) -> None:
     assert cover[3, 4] == 0
     assert colours(back, "/exponent/data/without")[0] == palette.FAILED
     assert np.argwhere(np.isnan(values(back, "/exponent/data/exponent"))).tolist() == [[3, 4]]
-
-
-def test_a_map_beyond_the_largest_image_is_thinned(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(chart, "CELLS", 16)
-    dataset = synthetic.painted(synthetic.USUAL[:3], (32, 40), undecided=5)
-    back = recorded(dataset, tmp_path)
-    labels = back.image("/basin/data/labels", "SegmentationImage", np.uint8)
-    rows, columns = ((np.arange(16) + 0.5) * (n / 16) for n in (32, 40))
-    assert (
-        labels == dataset["label"].values[np.ix_(rows.astype(int), columns.astype(int))] + 1
-    ).all()
