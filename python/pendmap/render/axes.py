@@ -109,6 +109,7 @@ def plot(  # noqa: PLR0913 (all of these a user may choose)
         if legend is not False:
             _legend(ax, panel, always=bool(legend))
         figure.get_layout_engine().execute(figure)
+        drawing.shrink(ax)
     return ax
 
 

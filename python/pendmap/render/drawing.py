@@ -61,8 +61,7 @@ def draw(
         figure = _made(chart, size, dpi)
     for axes in figure.axes:
         ticks.turn(axes)
-        if not axes.axison:
-            _shrink(axes)
+        shrink(axes)
     return figure
 
 
@@ -234,9 +233,9 @@ def _warn(axes: Axes, warning: str) -> None:
     words.set_in_layout(False)
 
 
-def _shrink(axes: Axes) -> None:
+def shrink(axes: Axes) -> None:
     """Make words of a panel without a frame so small that they fit in its width."""
-    for text in axes.texts:
+    for text in () if axes.axison else axes.texts:
         share = axes.bbox.width / max(text.get_window_extent().width, 1.0)
         text.set_fontsize(float(text.get_fontsize()) * min(share, 1.0))
 

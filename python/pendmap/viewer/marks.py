@@ -56,9 +56,11 @@ def unscaled(axis: Axis, values: npt.ArrayLike) -> Floats:
     """Return values of an axis from those that a linear axis shows."""
     x: Floats = np.asarray(values, dtype=float)
     if axis.scale == "log":
-        return 10.0**x
-    beyond = np.sign(x) * 10.0 ** (np.abs(x) - 1.0)
-    return axis.straight * np.where(np.abs(x) > 1.0, beyond, x) if axis.scale == "signed" else x
+        x = 10.0**x
+    elif axis.scale == "signed":
+        beyond = np.sign(x) * 10.0 ** (np.abs(x) - 1.0)
+        x = axis.straight * np.where(np.abs(x) > 1.0, beyond, x)
+    return x
 
 
 @dataclass(frozen=True, eq=False)
