@@ -13,7 +13,7 @@ import subprocess
 import sys
 import threading
 import time
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import dask
 import distributed
@@ -35,13 +35,6 @@ if TYPE_CHECKING:
 
 # The scheduler's status page listens even when it shows nothing: 8787 may be taken.
 ANY_PORT = "127.0.0.1:0"
-
-
-@contextlib.contextmanager
-def pool() -> Iterator[Executor]:
-    fresh = multiprocessing.get_context("spawn")
-    with concurrent.futures.ProcessPoolExecutor(2, mp_context=fresh) as executor:
-        yield executor
 
 
 @contextlib.contextmanager
@@ -82,7 +75,8 @@ def joblib() -> Iterator[Executor]:
 @pytest.fixture(scope="module")
 def two_processes() -> Iterator[Executor]:
     """Two processes for all analyses: each imports pendmap once."""
-    with pool() as executor:
+    fresh = multiprocessing.get_context("spawn")
+    with concurrent.futures.ProcessPoolExecutor(2, mp_context=fresh) as executor:
         yield executor
 
 
@@ -177,21 +171,17 @@ def test_workers_that_are_killed_cost_only_their_tiles(tmp_path: Path) -> None:
 def test_workers_that_are_gone_are_an_error_that_keeps_the_tiles(
     tmp_path: Path, two_processes: Executor
 ) -> None:
-    store = tmp_path / "map.zarr"
+    store, left = tmp_path / "map.zarr", iter(range(3))
 
     class Fewer:
         """An executor whose processes are lost after three tiles."""
 
-        left = 3
-
-        def submit(self, *call: object) -> object:
-            self.left -= 1
-            if self.left < 0:
-                lost = concurrent.futures.Future[object]()
-                lost.set_exception(concurrent.futures.process.BrokenProcessPool("one was killed"))
-                return lost
-            future = two_processes.submit(*call)  # type: ignore[arg-type]
-            concurrent.futures.wait([future])
+        def submit(self, *call: Any) -> object:  # noqa: ANN401
+            future = concurrent.futures.Future[object]()
+            if next(left, None) is None:
+                future.set_exception(concurrent.futures.BrokenExecutor("one was killed"))
+            else:
+                future.set_result(two_processes.submit(*call).result())
             return future
 
     with pytest.raises(OSError, match=r"the workers are gone \(one was killed\)") as gone:
