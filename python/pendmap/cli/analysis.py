@@ -63,8 +63,8 @@ def analysis_command(
                 if runs:
                     from pendmap.analysis.run import RunOptions
 
-                    kept = {"progress": progress, "store": store, "resume": resume}
-                    arguments["run"] = RunOptions(**kept, **chosen)
+                    chosen |= {"progress": progress, "store": store, "resume": resume}
+                    arguments["run"] = RunOptions(**chosen)
                 dataset = getattr(module, function)(pendulum, **arguments)
             if store is None:
                 show(dataset, outputs, module.SCHEMA)
