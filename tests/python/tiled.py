@@ -65,12 +65,11 @@ class StoppedError(Exception):
 
 def begun(analysis: Callable[..., Any], store: Path | str, share: float = 0.5, **keep: Any) -> None:  # noqa: ANN401
     """Begin a run in a store, and stop it at a share of its work, when a tile is kept."""
-    part = str(store) if "://" in str(store) else f"{str(store).rstrip('/')}.part"
-    system, folder = fsspec.core.url_to_fs(part)
+    system, folder = fsspec.core.url_to_fs(f"{store}.part/records")
 
     def stop(done: int, total: int) -> None:
         # The search for attractors reports its progress too.
-        if done > share * total and system.exists(folder):
+        if done > share * total:
             system.invalidate_cache()
             if any(name.rsplit("/", 1)[-1].isdecimal() for name in system.find(folder)):
                 raise StoppedError

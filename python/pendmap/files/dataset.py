@@ -298,19 +298,15 @@ def _check_whole(address: Address) -> None:
             raise InputError(f"{address}: lacks {key}")
         if hashlib.sha256(data[f"{path}/{key}"]).hexdigest() != digest:
             raise InputError(f"{address}: {key} was changed after it was written")
-        if key.endswith("/zarr.json"):
-            _check_array(address, key[:-10], json.loads(data[f"{path}/{key}"]), files)
-
-
-def _check_array(address: Address, name: str, array: Any, files: dict[str, str]) -> None:
-    """Raise InputError for an array with unknown codecs, or with other chunks than are there."""
-    if unknown := {codec["name"] for codec in array["codecs"]} - _CODECS:
-        known = f"must be among {', '.join(sorted(_CODECS))}, got {', '.join(sorted(unknown))}"
-        raise InputError(f"{address}: codecs of {name} {known}")
-    sides = array["chunk_grid"]["configuration"]["chunk_shape"]
-    count = math.prod(-(-n // max(k, 1)) for n, k in zip(array["shape"], sides, strict=True))
-    if count != (there := sum(key.startswith(f"{name}/c") for key in files)):
-        raise InputError(f"{address}: {name} must have {count} chunks, got {there}")
+    root = json.loads(data[f"{path}/zarr.json"])  # which the arrays are opened by
+    for name, array in root["consolidated_metadata"]["metadata"].items():
+        if unknown := {codec["name"] for codec in array["codecs"]} - _CODECS:
+            known = f"must be among {', '.join(sorted(_CODECS))}, got {', '.join(sorted(unknown))}"
+            raise InputError(f"{address}: codecs of {name} {known}")
+        sides = array["chunk_grid"]["configuration"]["chunk_shape"]
+        count = math.prod(-(-n // max(k, 1)) for n, k in zip(array["shape"], sides, strict=True))
+        if count != (there := sum(key.startswith(f"{name}/c") for key in files)):
+            raise InputError(f"{address}: {name} must have {count} chunks, got {there}")
 
 
 def check_replaceable(address: Address) -> None:

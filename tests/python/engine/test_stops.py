@@ -73,9 +73,8 @@ def test_a_full_disk_keeps_what_is_done(tmp_path: Path, name: str) -> None:
     tiled.assert_same(tiled.case(name, store=store, resume=True), tiled.plain(name))
 
 
-@pytest.mark.thorough
-def test_an_interrupted_run_with_workers_says_one_line(tmp_path: Path) -> None:
-    words = [str(COMMAND), "basins", "--grid", "2500", "--workers", "2", "--quiet"]
+def test_an_interrupted_run_says_one_line(tmp_path: Path) -> None:
+    words = [str(COMMAND), "basins", "--grid", "2500", "--quiet"]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     with started([*words, "--out", "m.zarr"], cwd=tmp_path, **pipes) as process:
         until(process, lambda: any_file(tmp_path, "m.zarr.part/records/label"))

@@ -7,13 +7,11 @@ import contextlib
 import json
 import multiprocessing
 import os
-import pathlib
 import signal
 import subprocess
 import sys
 import threading
-import time
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import dask
 import distributed
@@ -22,7 +20,6 @@ from joblib.externals.loky import get_reusable_executor
 
 import pendmap
 import tiled
-from conftest import COMMAND
 from interrupted import started, until
 
 if TYPE_CHECKING:
@@ -31,17 +28,8 @@ if TYPE_CHECKING:
     from contextlib import AbstractContextManager
     from pathlib import Path
 
-    from conftest import Run
-
 # The scheduler's status page listens even when it shows nothing: 8787 may be taken.
 ANY_PORT = "127.0.0.1:0"
-
-
-@contextlib.contextmanager
-def pool() -> Iterator[Executor]:
-    fresh = multiprocessing.get_context("spawn")
-    with concurrent.futures.ProcessPoolExecutor(2, mp_context=fresh) as executor:
-        yield executor
 
 
 @contextlib.contextmanager
@@ -82,7 +70,8 @@ def joblib() -> Iterator[Executor]:
 @pytest.fixture(scope="module")
 def two_processes() -> Iterator[Executor]:
     """Two processes for all analyses: each imports pendmap once."""
-    with pool() as executor:
+    fresh = multiprocessing.get_context("spawn")
+    with concurrent.futures.ProcessPoolExecutor(2, mp_context=fresh) as executor:
         yield executor
 
 
@@ -105,48 +94,15 @@ def test_executors_compute_the_same_bits(
         tiled.assert_same(kept, tiled.plain("map"))
 
 
-@pytest.mark.parametrize("workers", [("--workers", "1"), ("--scheduler",)])
-def test_commands_have_workers(
-    tmp_path: Path, workers: tuple[str, ...], pendmap_command: Run
-) -> None:
-    with contextlib.ExitStack() as stack:
-        if workers == ("--scheduler",):
-            workers = (*workers, stack.enter_context(separate_processes(tmp_path)))
-        words = ("basins", "--p", "0.6", "--grid", "30", "--out", "a.nc", "--quiet")
-        run = pendmap_command(*words, *workers)
-        assert (run.returncode, run.stderr) == (0, "")
-    plain = pendmap.basins(pendmap.Pendulum(p=0.6), 30)
-    tiled.assert_same(pendmap.load(tmp_path / "a.nc"), plain)
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("--workers", "0"), "--workers"),
-        (("--scheduler", "nonsense"), "scheduler 'nonsense': is not reached: "),
-        (("--workers", "1", "--scheduler", "tcp://a:1"), "only one of scheduler and workers"),
-    ],
-)
-def test_bad_workers_are_refused_in_one_line(
-    words: tuple[str, ...], said: str, pendmap_command: Run
-) -> None:
-    run = pendmap_command("basins", "--grid", "8", "--json", *words)
-    assert (run.returncode, run.stdout, len(run.stderr.splitlines())) == (2, "", 1)
-    assert said in run.stderr
-
-
-def test_processes_end_with_a_command_that_is_killed(tmp_path: Path) -> None:
-    words = [str(COMMAND), "basins", "--p", "1.7", "--grid", "2500", "--workers", "1", "--quiet"]
-    with started([*words, "--out", "m.nc"], cwd=tmp_path) as process:
-        children = pathlib.Path(f"/proc/{process.pid}/task/{process.pid}/children")
-        until(process, lambda: len(children.read_text().split()) > 1)
-        places = [pathlib.Path("/proc", pid) for pid in children.read_text().split()]
-        process.kill()
-        process.wait(60)
-    end = time.monotonic() + 20
-    while any(place.exists() for place in places):
-        assert time.monotonic() < end, "a worker outlives its command"
-        time.sleep(0.1)
+@pytest.mark.thorough
+def test_separate_processes_compute_the_same_bits(tmp_path: Path) -> None:
+    with (
+        separate_processes(tmp_path) as address,
+        distributed.Client(address, set_as_default=False) as client,
+    ):
+        for name in tiled.CASES:
+            kept = tiled.case(name, executor=client, store=tmp_path / f"{name}.zarr")
+            tiled.assert_same(kept, tiled.plain(name))
 
 
 @pytest.mark.thorough
@@ -177,21 +133,17 @@ def test_workers_that_are_killed_cost_only_their_tiles(tmp_path: Path) -> None:
 def test_workers_that_are_gone_are_an_error_that_keeps_the_tiles(
     tmp_path: Path, two_processes: Executor
 ) -> None:
-    store = tmp_path / "map.zarr"
+    store, left = tmp_path / "map.zarr", iter(range(3))
 
     class Fewer:
         """An executor whose processes are lost after three tiles."""
 
-        left = 3
-
-        def submit(self, *call: object) -> object:
-            self.left -= 1
-            if self.left < 0:
-                lost = concurrent.futures.Future[object]()
-                lost.set_exception(concurrent.futures.process.BrokenProcessPool("one was killed"))
-                return lost
-            future = two_processes.submit(*call)  # type: ignore[arg-type]
-            concurrent.futures.wait([future])
+        def submit(self, *call: Any) -> object:  # noqa: ANN401
+            future = concurrent.futures.Future[object]()
+            if next(left, None) is None:
+                future.set_exception(concurrent.futures.BrokenExecutor("one was killed"))
+            else:
+                future.set_result(two_processes.submit(*call).result())
             return future
 
     with pytest.raises(OSError, match=r"the workers are gone \(one was killed\)") as gone:
