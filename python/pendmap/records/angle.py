@@ -184,7 +184,9 @@ def _circle_angle(work: Work, x: Floats, y: Floats) -> Finding:
 
     for _ in range(2):
         inside = u[near], v[near]
-        fit = least_squares(_distances, (a, b, radius), args=inside, method="lm", xtol=1e-14, ftol=1e-14)
+        fit = least_squares(
+            _distances, (a, b, radius), args=inside, method="lm", xtol=1e-14, ftol=1e-14
+        )
         a, b, radius = fit.x.tolist()
         rms = math.sqrt(2 * fit.cost / near.sum())
         error = rms * math.sqrt(float(np.linalg.pinv(fit.jac.T @ fit.jac)[2, 2]))
