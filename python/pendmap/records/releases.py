@@ -81,7 +81,7 @@ def grown(work: Work, part: Stretch) -> list[Stretch]:
     places = np.searchsorted(work.time, crossing).tolist()
     lasts, steps = np.diff(half.crossing), np.diff(time)
     long = lasts > LONG_HALF * median_filter(lasts, 5, mode="nearest")
-    for k in np.flatnonzero(steps > GAP * np.median(steps)):
+    for k in np.flatnonzero(steps > GAP * np.median(steps)).tolist():
         long &= (half.crossing[1:] < time[k]) | (half.crossing[:-1] > time[k + 1])
     # The half cycle before may be that of the hand, too.
     hands = [(places[max(k - 1, 0)], places[k + 1]) for k in np.flatnonzero(long).tolist()]
