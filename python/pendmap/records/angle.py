@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from typing import TYPE_CHECKING, Final
 
@@ -9,7 +10,9 @@ import numpy as np
 
 from pendmap.errors import InputError
 from pendmap.formatting import counted
-from pendmap.records.rod_sensors import PLACE_EXAMPLE, angle_of_acceleration, angle_of_rate
+from pendmap.records.noise import noise_of
+from pendmap.records.rod_sensors import FEWEST_PEAKS, PLACE_EXAMPLE, angle_of_rate
+from pendmap.signal.half_cycles import swings
 from pendmap.signal.robust import normal_scale
 
 if TYPE_CHECKING:
@@ -23,6 +26,10 @@ WRAPPED_SPAN: Final = 1.01  # Greatest span of wrapped readings, turns: one turn
 WRAP_JUMP: Final = 0.75  # Least jump between neighbours that is a wrap, turns
 LARGEST_ANGLE: Final = 1e5  # Greatest plausible angle, rad: about 16,000 turns
 MOST_HUGE: Final = 0.5  # Share of implausible angles above which the column is refused
+LEAST_SWING: Final = 5.0  # Least reading of a swing, standard deviations of the noise
+LARGEST_READING: Final = 1.15  # Greatest reading, over the theoretical maximum: else wrong unit
+ONE_SIDED: Final = 0.15  # Smaller over larger side of the readings below which the axis is radial
+BLIND_SPOT: Final = 0.05  # Relative distance to the centre of oscillation that is refused
 RADIUS_DOUBT: Final = 0.02  # Relative standard error of the radius above which it is reported
 
 
@@ -77,7 +84,7 @@ def derived(work: Work) -> Finding | None:
 def _accelerated(work: Work) -> Finding:
     """Compute the angle from an acceleration alone."""
     reading, sensor = work.extra["acceleration"], _placed(work)
-    work.theta, work.accelerometer = angle_of_acceleration(work.time, reading, sensor, work.where)
+    work.theta, work.accelerometer = _angle_of_acceleration(work.time, reading, sensor, work.where)
     place = "an angular acceleration"
     if sensor.direction != "angular":
         removed = f"g = {sensor.gravity:g} m/s^2" if sensor.gravity else "gravity removed"
@@ -108,6 +115,58 @@ def _placed(work: Work) -> Accelerometer:
     )
 
 
+def _angle_of_acceleration(
+    time: Floats, reading: Floats, sensor: Accelerometer, where: str
+) -> tuple[Floats, Accelerometer]:
+    """Return the angle of an acceleration alone, right below a quarter turn, and its sensor.
+
+    Raises InputError if the readings are not those of free swings.
+    """
+    from scipy.special import ellipk
+
+    least = max(LEAST_SWING * np.nan_to_num(noise_of(time, reading).sigma), 1e-12)
+    middle = float(np.median(reading))
+    for _ in range(3):
+        half = swings(time, reading - middle, least=least)
+        if half.peak.size < FEWEST_PEAKS:
+            raise InputError(
+                f"{where}: the acceleration must show {FEWEST_PEAKS} half swings or more if there"
+                f" is no angle, got {half.peak.size}"
+            )
+        middle += float(np.median(half.middle))
+    values, size = reading - middle, np.abs(half.peak[1:-1])
+    blind = size.max() < 2 * least and sensor.gravity
+    low, high = np.quantile(reading, (0.02, 0.98)).tolist()
+    sided = low * high > 0 or min(abs(low), abs(high)) < ONE_SIDED * max(abs(low), abs(high))
+    if sided and sensor.direction != "angular":
+        raise InputError(
+            f'{where}: direction is "tangential", but the readings lie on one side, {low:.3g} to'
+            f" {high:.3g} m/s^2, as those along the rod: it must be the column of the axis across"
+            " the rod"
+        )
+    smaller = np.argsort(size)[: max(size.size // 3, 3)]
+    w0 = 2 * math.pi / float(np.median(half.period[smaller]))
+    for _ in range(20):
+        share = np.minimum(size / max(abs(dataclasses.replace(sensor, w0=w0).gain), 1e-9), 1.0)
+        grown = 2 / math.pi * ellipk(np.sin(np.arcsin(share) / 2) ** 2)
+        w0 = (w0 + 2 * math.pi * float(np.median((grown / half.period)[smaller]))) / 2
+    sensor = dataclasses.replace(sensor, w0=w0)
+    if blind or abs(sensor.distance_m * w0**2 / (sensor.gravity or math.inf) - 1) < BLIND_SPOT:
+        raise InputError(
+            f"{where}: distance_m is {sensor.distance_m:g}, and the readings are hardly more than"
+            " noise, as at the centre of oscillation, g/w0^2 from the pivot, where gravity and the"
+            " swing cancel: only damping is measured there; it must be another place on the rod, or"
+            " an angle must be recorded too"
+        )
+    most, top = abs(sensor.gain), float(np.quantile(size, 0.8))
+    if top > LARGEST_READING * most:
+        raise InputError(
+            f"{where}: the acceleration reaches {top:.3g} {sensor.unit}, and a swing of this period"
+            f" at most {most:.3g}: unit, distance_m, direction or gravity_removed is wrong"
+        )
+    return np.arcsin(np.clip(values / sensor.gain, -1, 1)), sensor
+
+
 def _circle_angle(work: Work, x: Floats, y: Floats) -> Finding:
     """Compute the angle of points on a fitted circle; down is along y, where the bob is fastest."""
     middle = np.array([np.median(x), np.median(y)])
@@ -125,7 +184,9 @@ def _circle_angle(work: Work, x: Floats, y: Floats) -> Finding:
 
     for _ in range(2):
         inside = u[near], v[near]
-        fit = least_squares(_distances, (a, b, radius), args=inside, method="lm", xtol=1e-14)
+        fit = least_squares(
+            _distances, (a, b, radius), args=inside, method="lm", xtol=1e-14, ftol=1e-14
+        )
         a, b, radius = fit.x.tolist()
         rms = math.sqrt(2 * fit.cost / near.sum())
         error = rms * math.sqrt(float(np.linalg.pinv(fit.jac.T @ fit.jac)[2, 2]))

@@ -201,7 +201,7 @@ def _parsed(kind: type[T], where: str, value: object, without: Iterable[str] = (
 
 def _checked(name: str, value: object, rule: Any) -> Any:  # noqa: ANN401 (of any type)
     """Return a value that is of a type, a dataclass, in a range, or one of a list."""
-    if dataclasses.is_dataclass(rule):
+    if isinstance(rule, type) and dataclasses.is_dataclass(rule):
         return _parsed(rule, name, value)
     if rule is bool:
         return check_flag(name, value)

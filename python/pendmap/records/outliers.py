@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from pendmap.records.experiment import Finding
     from pendmap.records.work import Work
     from pendmap.signal import Floats, Indices, Mask
-    from pendmap.signal.local_polynomial import LocalFit
 
     _Group = slice | Indices
 
@@ -120,7 +119,7 @@ def _judged(
 
 def _suspects(work: Work, theta: Floats) -> tuple[Indices, Floats]:
     """Return samples far from their neighbours, and the standard deviation around each."""
-    from scipy.ndimage import median_filter
+    from scipy.ndimage import maximum_filter1d, median_filter
 
     best, *others = (
         local_fit(work.time, theta, degree=degree, points=points) for degree, points in DEGREES[:3]
@@ -133,16 +132,11 @@ def _suspects(work: Work, theta: Floats) -> tuple[Indices, Floats]:
         return np.empty(0, np.intp), np.empty(0)
     near = 1.4826 * median_filter(size, size=min(SCALE_SAMPLES, size.size), mode="nearest")
     scale = np.maximum(near, max(broad_scale(size), 1e-9))
-    which = (size > SUSPECT * scale + 2 * work.count) & _highest(best)
+    highest = maximum_filter1d(
+        size, 2 * best.neighbours + 1, mode="nearest"
+    )  # of windows in common
+    which = (size > SUSPECT * scale + 2 * work.count) & (size >= highest)
     return best.middle[which], scale[which]
-
-
-def _highest(fit: LocalFit) -> Mask:
-    """Return the mask of residuals that are the largest of all overlapping windows."""
-    from scipy.ndimage import maximum_filter1d
-
-    size = np.abs(fit.residual)
-    return np.asarray(size >= maximum_filter1d(size, 2 * fit.neighbours + 1, mode="nearest"), bool)
 
 
 def _judge(

@@ -78,16 +78,16 @@ def grown(work: Work, part: Stretch) -> list[Stretch]:
     # The readings after the last crossing may be those of a hand.
     late = np.max(np.abs(theta[time > half.crossing[-1]]), initial=0.0)
     size, crossing = np.append(np.abs(half.peak), late), np.append(half.crossing, time[-1])
-    places = np.searchsorted(work.time, crossing)
+    places = np.searchsorted(work.time, crossing).tolist()
     lasts, steps = np.diff(half.crossing), np.diff(time)
     long = lasts > LONG_HALF * median_filter(lasts, 5, mode="nearest")
-    for k in np.flatnonzero(steps > GAP * np.median(steps)):
+    for k in np.flatnonzero(steps > GAP * np.median(steps)).tolist():
         long &= (half.crossing[1:] < time[k]) | (half.crossing[:-1] > time[k + 1])
     # The half cycle before may be that of the hand, too.
-    hands = [(places[max(k - 1, 0)], places[k + 1]) for k in np.flatnonzero(long)]
+    hands = [(places[max(k - 1, 0)], places[k + 1]) for k in np.flatnonzero(long).tolist()]
     before = np.abs(theta[time < crossing[0]])
     if np.argmax(before) and (1 + RELEASE_RISE) * before.max() + 2 * work.limit < size[1]:
-        hands.append((low, places[np.argmax(size) + 1]))  # pushed from rest
+        hands.append((low, places[int(np.argmax(size)) + 1]))  # pushed from rest
     # Pairs of neighbours: an offset makes every other half cycle larger.
     pairs = np.maximum(size[:-1], size[1:])
     # A single outlier raises two pairs.

@@ -21,8 +21,6 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.errors import InputError
-from pendmap.records.noise import noise_of
 from pendmap.records.units import ANGULAR_ACCELERATIONS, name_and_unit, plain, spelling
 from pendmap.signal.half_cycles import swings
 
@@ -36,10 +34,6 @@ PLACE_EXAMPLE: Final = 'acceleration = { direction = "tangential", distance_m = 
 
 OVER_THE_TOP: Final = 4 * math.pi  # Range of angles above which a record contains rotations, rad
 FEWEST_PEAKS: Final = 4  # Fewest turning points from which a drift or a period is estimated
-LEAST_SWING: Final = 5.0  # Least reading of a swing, standard deviations of the noise
-LARGEST_READING: Final = 1.15  # Greatest reading, over the theoretical maximum: else wrong unit
-ONE_SIDED: Final = 0.15  # Smaller over larger side of the readings below which the axis is radial
-BLIND_SPOT: Final = 0.05  # Relative distance to the centre of oscillation that is refused
 
 
 @dataclasses.dataclass(frozen=True)
@@ -134,55 +128,3 @@ def gyroscope_of(time: Floats, theta: Floats, rate: Floats) -> Gyroscope:
     passing = np.interp(half.crossing[1:-1], time, speed)[swung]
     w0 = float(np.sum(passing) / np.sum(2 * np.sin(middle[swung] / 2)))
     return Gyroscope(w0, bias)
-
-
-def angle_of_acceleration(
-    time: Floats, reading: Floats, sensor: Accelerometer, where: str
-) -> tuple[Floats, Accelerometer]:
-    """Return the angle of an acceleration alone, right below a quarter turn, and its sensor.
-
-    Raises InputError if the readings are not those of free swings.
-    """
-    from scipy.special import ellipk
-
-    least = max(LEAST_SWING * np.nan_to_num(noise_of(time, reading).sigma), 1e-12)
-    middle = float(np.median(reading))
-    for _ in range(3):
-        half = swings(time, reading - middle, least=least)
-        if half.peak.size < FEWEST_PEAKS:
-            raise InputError(
-                f"{where}: the acceleration must show {FEWEST_PEAKS} half swings or more if there"
-                f" is no angle, got {half.peak.size}"
-            )
-        middle += float(np.median(half.middle))
-    values, size = reading - middle, np.abs(half.peak[1:-1])
-    blind = size.max() < 2 * least and sensor.gravity
-    low, high = np.quantile(reading, (0.02, 0.98)).tolist()
-    sided = low * high > 0 or min(abs(low), abs(high)) < ONE_SIDED * max(abs(low), abs(high))
-    if sided and sensor.direction != "angular":
-        raise InputError(
-            f'{where}: direction is "tangential", but the readings lie on one side, {low:.3g} to'
-            f" {high:.3g} m/s^2, as those along the rod: it must be the column of the axis across"
-            " the rod"
-        )
-    smaller = np.argsort(size)[: max(size.size // 3, 3)]
-    w0 = 2 * math.pi / float(np.median(half.period[smaller]))
-    for _ in range(20):
-        share = np.minimum(size / max(abs(dataclasses.replace(sensor, w0=w0).gain), 1e-9), 1.0)
-        grown = 2 / math.pi * ellipk(np.sin(np.arcsin(share) / 2) ** 2)
-        w0 = (w0 + 2 * math.pi * float(np.median((grown / half.period)[smaller]))) / 2
-    sensor = dataclasses.replace(sensor, w0=w0)
-    if blind or abs(sensor.distance_m * w0**2 / (sensor.gravity or math.inf) - 1) < BLIND_SPOT:
-        raise InputError(
-            f"{where}: distance_m is {sensor.distance_m:g}, and the readings are hardly more than"
-            " noise, as at the centre of oscillation, g/w0^2 from the pivot, where gravity and the"
-            " swing cancel: only damping is measured there; it must be another place on the rod, or"
-            " an angle must be recorded too"
-        )
-    most, top = abs(sensor.gain), float(np.quantile(size, 0.8))
-    if top > LARGEST_READING * most:
-        raise InputError(
-            f"{where}: the acceleration reaches {top:.3g} {sensor.unit}, and a swing of this period"
-            f" at most {most:.3g}: unit, distance_m, direction or gravity_removed is wrong"
-        )
-    return np.arcsin(np.clip(values / sensor.gain, -1, 1)), sensor

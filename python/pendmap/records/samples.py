@@ -117,7 +117,8 @@ def _abrupt(work: Work, low: int, high: int) -> bool:
 
 def _missed(work: Work, low: int, high: int) -> float:
     """Return the expected displacement during a plateau from the speeds at its borders, rad."""
-    sides = (slice(max(low - 4, 0), low), slice(high, high + 4))
+    reach = max(high - low, 4)
+    sides = (slice(max(low - reach, 0), low), slice(high, high + reach))
     slopes = [
         float(np.ptp(work.theta[side]) / np.ptp(work.time[side]))
         for side in sides

@@ -161,19 +161,17 @@ def _robust_line(columns: Floats, values: Floats) -> tuple[Floats, Floats]:
 
 def seconds(work: Work) -> Finding | None:
     """Convert times in milliseconds, microseconds or nanoseconds to seconds."""
-    work.periods = _periods(work)
-    if work.periods is None or SHORTEST_PERIOD < (small := work.periods.small) < LONGEST_PERIOD:
+    periods = _periods(work)
+    if periods is None or SHORTEST_PERIOD < (small := periods.small) < LONGEST_PERIOD:
         return None
     for name, factor in SHORT_UNITS.items():
         if small <= LONGEST_PERIOD or not SHORTEST_PERIOD < small * factor < LONGEST_PERIOD:
             continue
         if "time" in work.declared:
             return work.finding("time-unit.declared", period=small, unit=name)
-        size = factor if work.integrated else 1.0
         finding = work.finding("time-unit.short", period=small, unit=name)
         work.time *= factor
-        work.theta *= size
-        work.periods = Periods(work.periods.amplitude * size, work.periods.period * factor)
+        work.theta *= factor if work.integrated else 1.0
         return finding
     return work.finding("time-unit.wrong", period=small)
 
@@ -191,7 +189,7 @@ def _periods(work: Work) -> Periods | None:
 
 def radians(work: Work) -> Finding | None:
     """Convert degrees to radians where the swings are impossible otherwise."""
-    periods = work.periods
+    periods = _periods(work)
     if periods is None or not _impossible(periods):
         return None
     largest = float(np.max(periods.amplitude))
@@ -202,7 +200,6 @@ def radians(work: Work) -> Finding | None:
         work.extra["velocity"] = work.extra["velocity"] * DEGREE
     work.count *= DEGREE
     work.estimated_step *= DEGREE
-    work.periods = Periods(periods.amplitude * DEGREE, periods.period)
     read = "velocities are degrees a second" if work.integrated else "angles are degrees"
     return work.finding("angle-unit.degrees", read=read, largest=largest)
 
@@ -219,7 +216,7 @@ def _channel(work: Work) -> str:
 
 def curvature(work: Work) -> Finding | None:
     """Report periods that do not increase with amplitude as a pendulum's do."""
-    periods = work.periods
+    periods = _periods(work)
     if periods is None or periods.period.size < FEWEST_PERIODS + 2:
         return None
     largest, grown = float(np.max(periods.amplitude)), growth(periods.amplitude)
@@ -243,7 +240,8 @@ def curvature(work: Work) -> Finding | None:
 
 def period_of_rig(work: Work) -> Finding | None:
     """Report a period of small swings that differs from that of [rig]."""
-    if work.periods is None:
+    periods = _periods(work)
+    if periods is None:
         return None
     expected = {}
     if "w0" in work.known:
@@ -251,7 +249,7 @@ def period_of_rig(work: Work) -> Finding | None:
     if "length_m" in work.known:
         root = math.sqrt(work.known["length_m"] / work.known.get("gravity", GRAVITY))
         expected[f"length_m = {work.known['length_m']:g} m"] = 2 * math.pi * root
-    seen = work.periods.smallest
+    seen = periods.smallest
     other = [
         f"{period:.4g} s by {name}"
         for name, period in expected.items()
@@ -265,7 +263,8 @@ def period_of_rig(work: Work) -> Finding | None:
 def sampling(work: Work) -> Finding | None:
     """Report a sampling rate too low for the motion."""
     interval = float(np.median(np.diff(work.time)))
-    number = work.periods.small / interval if work.periods else math.inf
+    periods = _periods(work)
+    number = periods.small / interval if periods else math.inf
     fastest = float(np.quantile(np.abs(np.diff(work.theta)), 0.99))
     if number < SAMPLES_A_PERIOD:
         return work.finding("sampling-slow", number=number, column=work.columns.get("angle", "..."))

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from pendmap.records.description import RunPlan
     from pendmap.records.experiment import Finding, Segment
     from pendmap.records.rod_sensors import Accelerometer
-    from pendmap.records.scale import Periods
     from pendmap.signal import Floats, Indices, Mask, Stretch
 
 FEWEST_SAMPLES = 5  # Fewest samples of a record
@@ -61,7 +60,6 @@ class Work:
     integrated: bool = False  # the angle is the integral of the velocity
     place_missing: str = ""  # missing keys of [columns] on the accelerometer's position
     moves: bool = False  # whether the pendulum moves
-    periods: Periods | None = None  # periods of a free record
     jumps: list[Jump] = dataclasses.field(default_factory=list)  # of the reading, not corrected
     bridged: Floats = dataclasses.field(default_factory=lambda: np.empty(0))  # without outliers
     parts: list[Stretch] = dataclasses.field(default_factory=list)  # free motions

@@ -78,13 +78,6 @@ def test_noise_is_estimated_within_a_few_per_cent(rate: float, counts: int) -> N
         assert abs(floor.sigma / truth - 1) < 0.05 + 3 * 0.8 / np.sqrt(time.size)
 
 
-def test_noise_of_a_rotation(tmp_path: Path) -> None:
-    time, theta, _ = motion(start=0.0, velocity=16.0, rate=30.0)
-    readings = theta + np.random.default_rng(4).normal(0, 0.003, theta.size)
-    floor = pendmap.noise_floor(read(tmp_path, text((time, readings))))
-    assert floor.sigma == pytest.approx(0.003, rel=0.12)
-
-
 @pytest.mark.parametrize("scatter", [0.0, 5e-4, 1e-3, 2e-3])
 @pytest.mark.parametrize("lost", [np.r_[:0], np.r_[300:302, 700:706, 1200:1350]])
 def test_missing_samples_are_told_from_stamps_that_scatter(
@@ -289,9 +282,3 @@ def test_a_missed_count_is_found_in_a_record_with_slips(tmp_path: Path) -> None:
     run = read(tmp_path, text((stamps, theta)))
     assert found(run)["time-slips"].mended
     assert found(run)["missed-counts"].text.startswith("1 jump of the reading (+0.046")
-
-
-def test_a_regular_clock_has_no_slips(tmp_path: Path) -> None:
-    stamps, _ = late(100.0, 1)
-    run = read(tmp_path, text((stamps, readings(stamps, 1))))
-    assert not {"time-slips", "missed-counts"} & set(found(run))

@@ -140,13 +140,6 @@ def test_times_may_be_dates(
     same(run, within=1e-12)
 
 
-def test_dates_that_are_none_are_refused(tmp_path: Path) -> None:
-    rows = [f"2026-02-{28 + k:02d} 10:00:00,{k}" for k in range(9)]
-    (tmp_path / "a.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
-    with pytest.raises(pendmap.InputError, match="got no rows of numbers"):
-        pendmap.read_experiment(tmp_path / "a.csv")
-
-
 def test_a_data_frame_without_times_has_a_rate() -> None:
     time, theta = clean()
     frame = pd.DataFrame({"theta_deg": np.degrees(theta)})

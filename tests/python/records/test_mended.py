@@ -147,7 +147,13 @@ def test_a_fault_is_reported(tmp_path: Path, case: str) -> None:
 
 
 PACKAGE = Path(pendmap.__file__).parent / "records"
-GIVEN = {"finding": set(), "finding_of": set(), "leave_out": {"number"}, "distrust": {"number"}}
+GIVEN = {
+    "note": set(),
+    "finding": set(),
+    "finding_of": set(),
+    "leave_out": {"number"},
+    "distrust": {"number"},
+}
 
 
 def test_each_finding_of_the_table_is_used_with_the_values_of_its_text() -> None:

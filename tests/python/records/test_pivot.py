@@ -107,9 +107,7 @@ def test_a_sign_and_a_scale_turn_raw_columns_into_the_pivot(tmp_path: Path) -> N
     ("key", "says"),
     [
         ("sign = 2", "sign must be 1 or -1, got 2"),
-        ("sign = 0", "sign must be 1 or -1, got 0"),
         ("scale = 0", "scale must be .*, got 0"),
-        ('scale = "big"', "must be a number"),
     ],
 )
 def test_another_sign_or_scale_is_refused(tmp_path: Path, key: str, says: str) -> None:
