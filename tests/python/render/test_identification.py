@@ -139,7 +139,7 @@ def test_half_cycles_are_numbered_by_their_peaks() -> None:
 
 
 def test_the_velocity_of_a_record_with_few_samples_a_half_cycle_is_drawn() -> None:
-    found = as_report(*record(decay(release=1.0), seconds=40.0, rate=13.0))
+    found = as_report(*record(decay(release=1.0), seconds=40.0, rate=21.0))
     first = next(panel for panel in half_cycles.part(found).panels if panel.name == "velocity")
     speeds = [mark.y for mark in first.marks if isinstance(mark, marks.Line)]
     fastest = np.nanmax(np.abs(np.concatenate(speeds)))
