@@ -217,8 +217,9 @@ def _histogram(one: Statistic, base: float) -> list[Mark]:
     ]
     marks: list[Mark] = [Areas(columns, colour=ENSEMBLE, name="ensemble")]
     if counts[-1]:
-        name = "not settled by the end"
-        marks.append(Areas(columns[-1:], colour="#ffffff", hatch="////", name=name))
+        look: dict[str, Any] = {"name": "not settled by the end"}
+        marks.append(Areas(columns[-1:], colour=ENSEMBLE, **look))
+        marks.append(Areas(columns[-1:], colour="#ffffff", hatch="////", **look))
     return [
         *marks,
         Line(np.array([0.0, 1.0]), np.full(2, base), colour=QUIET, width=0.6),
