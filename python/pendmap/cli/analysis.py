@@ -52,7 +52,9 @@ def analysis_command(
     def make(prepare: Callable[..., dict[str, Any]]) -> click.Command:
         def run(**given: Any) -> None:  # noqa: ANN401 (the options)
             resume = given.pop("resume", False)
-            chosen = {key: given.pop(key) for key in ("threads", "seed") if key in given}
+            chosen: dict[str, Any] = {
+                key: given.pop(key) for key in ("threads", "seed") if key in given
+            }
             pendulum, outputs = begin(given, name, going_on=resume)
             arguments = prepare(pendulum, outputs, **given)
             module = importlib.import_module(f"pendmap.analysis.{kind}")
