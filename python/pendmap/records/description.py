@@ -190,7 +190,8 @@ def _parsed(kind: type[T], where: str, value: object, without: Iterable[str] = (
     """Return a table as a dataclass, each of whose fields has a check."""
     example = f" like {EXAMPLES[kind]}" if kind in EXAMPLES else ""
     table = _table(where, value, example)
-    fields = {f.name: f for f in dataclasses.fields(kind) if f.name not in without}  # type: ignore[arg-type]
+    every = dataclasses.fields(kind)  # type: ignore[arg-type]
+    fields = {field.name: field for field in every if field.name not in without}
     _refuse_unknown(table, fields, where, ", ".join(fields) + (example and f",{example}"))
     for name, field in fields.items():
         if field.default is dataclasses.MISSING and name not in table:
