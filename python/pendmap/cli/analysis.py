@@ -52,9 +52,8 @@ def analysis_command(
     def make(prepare: Callable[..., dict[str, Any]]) -> click.Command:
         def run(**given: Any) -> None:  # noqa: ANN401 (the options)
             resume = given.pop("resume", False)
-            chosen: dict[str, Any] = {
-                key: given.pop(key) for key in ("threads", "seed") if key in given
-            }
+            names = [key for key in ("threads", "seed") if key in given]
+            run_options: dict[str, Any] = {key: given.pop(key) for key in names}
             pendulum, outputs = begin(given, name, going_on=resume)
             arguments = prepare(pendulum, outputs, **given)
             module = importlib.import_module(f"pendmap.analysis.{kind}")
@@ -65,8 +64,8 @@ def analysis_command(
                 if runs:
                     from pendmap.analysis.run import RunOptions
 
-                    chosen |= {"progress": progress, "store": store, "resume": resume}
-                    arguments["run"] = RunOptions(**chosen)
+                    run_options |= {"progress": progress, "store": store, "resume": resume}
+                    arguments["run"] = RunOptions(**run_options)
                 dataset = getattr(module, function)(pendulum, **arguments)
             if store is None:
                 show(dataset, outputs, module.SCHEMA)
