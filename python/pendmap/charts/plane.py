@@ -161,7 +161,7 @@ def log_ticks(low: float, high: float, most: int = 8) -> list[float]:
         if most * gap >= CLOSEST * math.log10(high / low):
             break
     if len(listed) < 2:  # noqa: PLR2004 (a scale)
-        return sorted({float(round(x)) for x in np.linspace(low, high, 5)})
+        return [at for at, _ in plain_ticks(low, high)]
     return listed[:: -(-len(listed) // most)]
 
 
