@@ -116,17 +116,6 @@ def test_regular_motion_without_damping_has_the_growth_of_tau_and_no_error() -> 
     assert 0 < chaotic["largest_exponent_stderr"] < 0.01 * chaotic["largest_exponent"]
 
 
-def test_the_seed_changes_the_sample(chaos: xr.Dataset) -> None:
-    few = pendmap.lyapunov(CHAOS, precision=0.01)
-    other = pendmap.lyapunov(CHAOS, precision=0.01, run=pendmap.RunOptions(seed=1))
-    assert few["largest_exponent"].item() != other["largest_exponent"].item()
-    apart = few["largest_exponent"].item() - other["largest_exponent"].item()
-    assert abs(apart) < 4 * math.hypot(
-        few["largest_exponent_stderr"].item(), other["largest_exponent_stderr"].item()
-    )
-    assert few["largest_exponent_stderr"].item() > chaos["largest_exponent_stderr"].item()
-
-
 def test_a_pendulum_held_by_friction_has_no_exponent() -> None:
     found = pendmap.lyapunov(Pendulum(gamma=0.1, p=1.5, omega=0.87, theta_r=0.2))
     assert found["end"].item() == "captured"

@@ -123,7 +123,6 @@ def watched(pendulum: Pendulum | Rig, until: float, **words: Any) -> tuple[Any, 
 @pytest.mark.parametrize(
     "pendulum",
     [
-        Pendulum(p=1.7, omega=0.87),
         Pendulum(p=1.5, omega=0.87, theta_r=0.2, phase=0.4),
         Pendulum(p=0.9, effects=(pendmap.Effect("drive_chirp", {"r": 1e-4}),), lab_time=3.0),
         Rig(w0=6.2, c_over_m=0.3, Tr=0.5, p=1.2, Omega=7.0),
