@@ -229,10 +229,11 @@ def _times(until: float | None, t_eval: ArrayLike | None) -> tuple[float, Floats
     """Return the last time, and the times of the samples if they are given."""
     wanted = None if t_eval is None else grid.ascending("t_eval", t_eval)
     if wanted is None:
-        until = errors.check_number("until", until)
-        if until <= 0:
-            raise errors.InputError(f"until must be a time above 0, got {until:g}")
-        return until, None
+        end = 0.0 if until is None else errors.check_number("until", until)
+        if end <= 0:
+            text = "must be a time above 0 where t_eval is left out"
+            raise errors.InputError(f"until {text}, got {until}")
+        return end, None
     if wanted[0] < 0 or wanted[-1] <= 0:
         text = errors.short_repr(t_eval)
         raise errors.InputError(f"t_eval must be times from 0, the last above 0, got {text}")

@@ -69,13 +69,6 @@ def test_damping_and_friction_are_drawn_from_a_gaussian_cut_off_at_0(name: str) 
     assert values.std() == pytest.approx(expected.std(), rel=0.08)
 
 
-def test_parameters_of_either_sign_are_drawn_with_both() -> None:
-    bias = Effect("bias_torque", {"torque": 0.0})
-    rig = Rig(w0=6.2, effects=(bias,), notes=noted(["bias_torque.torque"], [[1e-4]]))
-    values = drawn(rig, 400, RunOptions(seed=SEED)).values
-    assert 120 < (values < 0).sum() < 280
-
-
 @pytest.mark.parametrize(
     ("notes", "said"),
     [

@@ -38,14 +38,6 @@ def test_a_vertical_line_leaves_known_shares_in_its_boxes() -> None:
         assert not found.is_fractal
 
 
-def test_a_diagonal_has_the_entropy_of_its_triangles() -> None:
-    """Of a diagonal box 15 of 25 cells are on or below the diagonal; other boxes have one label."""
-    found = pendmap.basin_entropy(np.tri(200, dtype=int) + 1)
-    assert (found.boxes, found.boundary_boxes) == (1600, 40)
-    assert found.boundary == pytest.approx(entropy(15 / 25), abs=1e-12)
-    assert found.boundary_stderr < 1e-12
-
-
 def test_random_labels_have_the_logarithm_of_their_number() -> None:
     """The expected value is the mean entropy over all labellings of a box of 25 cells."""
     for labels in (2, 3):

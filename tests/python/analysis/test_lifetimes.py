@@ -82,18 +82,6 @@ def test_against_the_reference(p: float, truths: dict[str, Any]) -> None:
         assert gap < 3 * math.hypot(a["mean_periods_stderr"], known["stderr"]), known
 
 
-def test_the_error_is_the_spread_over_seeds() -> None:
-    found = [
-        facts(pendmap.lifetime(Pendulum(p=1.2), starts=6000, run=pendmap.RunOptions(seed=k)))
-        for k in range(20)
-    ]
-    means = np.array([a["mean_periods"] for a in found])
-    errors = np.array([a["mean_periods_stderr"] for a in found])
-    spread = (((means - np.average(means, weights=errors**-2)) / errors) ** 2).sum()
-    # Chi squared with 19 degrees of freedom: outside once in five hundred.
-    assert 5.5 < spread < 43, spread
-
-
 def test_the_tail_is_that_of_the_starts(long: xr.Dataset) -> None:
     a = facts(long)
     begin = a["from_period"]
