@@ -51,10 +51,8 @@ def _attractors(dataset: xr.Dataset) -> list[dict[str, Any]]:
 def drawn_lifetimes(dataset: xr.Dataset) -> dict[str, Any]:
     """Return the draws of a lifetime for the JSON object."""
     a = facts(dataset)
-    ci95 = [a["mean_periods_low"], a["mean_periods_high"]]
-    return {"mean_periods_ci95": ci95} | {
-        name: a[name] for name in ("transient_share", "persistent_share")
-    }
+    shares = {name: a[name] for name in ("transient_share", "persistent_share")}
+    return {"mean_periods_ci95": [a["mean_periods_low"], a["mean_periods_high"]]} | shares
 
 
 SCHEMA = Schema(

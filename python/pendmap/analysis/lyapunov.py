@@ -193,10 +193,7 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
 
 
 def _value(raw: _core.Lyapunov, period: float) -> tuple[float, float, float]:
-    """Return the exponent per unit of tau, its standard error, and the one of regular motion.
-
-    The last is that of undamped motion whose deviations grow as tau. Missing values are nan.
-    """
+    """Return the exponent per tau, its error, and that of deviations that grow as tau; or nan."""
     if raw.attractor is not None:
         return raw.attractor.exponent, raw.attractor.exponent_stderr, math.nan
     if raw.ensemble is None or raw.end != "undamped":

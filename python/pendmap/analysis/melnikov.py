@@ -122,9 +122,7 @@ def melnikov(pendulum: Pendulum | Rig, omega: ArrayLike | None = None) -> xr.Dat
         raise InputError(
             "effects: an effect counts turns: no orbit leads from one upright position to the next"
         )
-    if omega is None:
-        omega = np.linspace(*_RANGE)
-    frequencies = grid.frequencies(omega)
+    frequencies = grid.frequencies(np.linspace(*_RANGE) if omega is None else omega)
     with core_errors():
         orbits, sense = _orbits(bare)
         at = {name: _threshold(bare, bare.omega, orbit) for name, orbit in orbits.items()}

@@ -136,11 +136,10 @@ def orbit(
         box = grid.bare(units)
         raw = _core.orbits(bare, (n, w), *box, run.workers, run.progress)
         paths = _paths(bare, raw.orbits, units)
-    orbits = raw.orbits
     dataset = xr.Dataset(
         {
-            **table(orbits, units, "orbit"),
-            "stable": flag("orbit", [o.stable for o in orbits], "whether it is stable"),
+            **table(raw.orbits, units, "orbit"),
+            "stable": flag("orbit", [o.stable for o in raw.orbits], "whether it is stable"),
             **paths,
         }
     )

@@ -288,12 +288,12 @@ def _curves(
     omega, p = by_name["omega"], by_name["p"]
     if omega.values.size == 1 or p.bare[-1] <= 0:
         raise InputError("curves must have ranges of omega and of p above 0")
-    # Cells extend half a spacing beyond their centres: curves go beyond the edges of the figure.
+    # Cells extend half a spacing beyond their centres: curves go to the edges of the figure.
     half = np.diff(omega.bare)[0] / 2
     low, high = omega.bare[0] - half, omega.bare[-1] + half
     p_max = float(p.bare[-1] + (np.diff(p.bare)[0] / 2 if p.bare.size > 1 else 0.0))
     frequency = np.linspace(max(low, omega.bare[0] / 2), high, _FREQUENCIES)
-    curves = tongues(model, frequency, 1.2 * p_max, inverted=False, refine=True, run=run)
+    curves = tongues(model, frequency, p_max, inverted=False, refine=True, run=run)
     scale, sought = omega.values[-1] / omega.bare[-1], curves["asked"]
     return {
         "curve_omega": ("curve_frequency", scale * curves["omega"].values, omega.attributes),

@@ -14,6 +14,7 @@ second harmonic adds ``s p^2``, ``s = 1/(4 (4 omega^2 - 1))``, to both:
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from typing import TYPE_CHECKING, Any, TypeAlias, Unpack
 
 import numpy as np
@@ -47,6 +48,7 @@ Row: TypeAlias = _core.CriticalAmplitudes
 _NOSE = 1e-6
 """Width of an interval in which a curve turns back, below which it is not halved, fraction of the
 range. Near such a turn the amplitude varies as the square root of the distance."""
+_TOP = 0.995  # Share of the largest amplitude from which a curve leaves the figure
 PLANES = ("omega-p", "e-alpha2")
 """Eq. 1.2's ``(omega, p)``, and eq. 1.4's ``(alpha^2, e) = (1/omega^2, p/omega^2)``."""
 _HIGHEST = 2.6  # Largest ``e`` of a figure in the plane of eq. 1.4, if it was computed
@@ -204,7 +206,7 @@ def tongues(  # noqa: PLR0913 (physics first, numerical choices by name)
     with core_errors():
         frequencies, rows = asked, solve(asked, folds=True)
         if refine:
-            frequencies, rows = with_turns(asked, rows, solve)
+            frequencies, rows = with_turns(asked, rows, solve, p_max)
     hanging, undamped, upright = (list(column) for column in zip(*rows, strict=True))
     moved = bool(hanging[0].moved)
     by_perturbation = asymptotic(hanging, frequencies, bare.gamma, 0.0 if moved else p_max)
@@ -286,17 +288,12 @@ def _summary(dataset: xr.Dataset) -> list[str]:
         lines.append(f"{hanging.capitalize()} is unstable from p = 0 on at omega = {omegas}.")
     elif p.size:
         least = int(np.argmin(p))
-        lines.append(
-            f"Of these frequencies {hanging} loses its stability soonest at omega = "
-            f"{omega[index[least]]:.6g}: p = {p[least]:.9g} (multiplier "
-            f"{dataset['multiplier'].values[least]})."
-        )
+        soonest = f"soonest at omega = {omega[index[least]]:.6g}: p = {p[least]:.9g}"
+        lines.append(f"Of these frequencies {hanging} loses its stability {soonest}.")
     born = omega[np.isfinite(dataset["fold"].values)]
     if born.size:
-        lines.append(
-            f"At {counted(born.size, 'value')} of omega from {born.min():.4g} to {born.max():.4g} "
-            "the oscillation is born toward smaller p: it exists from its fold on."
-        )
+        where = f"{counted(born.size, 'value')} of omega, {born.min():.4g} to {born.max():.4g},"
+        lines.append(f"At {where} the oscillation is born toward smaller p: it has a fold.")
     if a["inverted_rest"]:
         rest = "The orbit about inverted rest" if a["moved"] else "Inverted rest"
         names = ("inverted_p", "inverted_omega", "inverted_stable_above")
@@ -311,17 +308,17 @@ def with_turns(
     omega: Floats,
     rows: list[tuple[Row, ...]],
     solve: Callable[[Floats], list[tuple[Row, ...]]],
+    p_max: float,
 ) -> tuple[Floats, list[tuple[Row, ...]]]:
-    """Return frequencies with those near which a curve turns back added, and the rows there.
+    """Return frequencies with those near which a curve ends added, and the rows of all rests.
 
-    Where a curve turns back between two frequencies, one of them has two critical amplitudes more
-    with the same multiplier: the interval is halved. ``rows`` are those of several rests.
+    An interval is halved if a curve turns back, or ends below ``p_max``, between its frequencies.
     """
     rows, least = list(rows), _NOSE * (omega[-1] - omega[0])
     while True:
-        counts = np.array([[r.multiplier.count(m) for r in row for m in (1, -1)] for row in rows])
-        turns = (np.abs(np.diff(counts, axis=0)) > 1).any(axis=1)
-        places = np.flatnonzero(turns & (np.diff(omega) > least))
+        pairs = (zip(a, b, strict=True) for a, b in itertools.pairwise(rows))
+        ends = np.array([any(_ends(*one, p_max) for one in pair) for pair in pairs], dtype=bool)
+        places = np.flatnonzero(ends & (np.diff(omega) > least))
         if not places.size:
             return omega, rows
         between = (omega[places] + omega[places + 1]) / 2
@@ -329,6 +326,16 @@ def with_turns(
         omega = np.insert(omega, places + 1, between)
         for place, row in zip(places[::-1], more[::-1], strict=True):
             rows.insert(place + 1, row)
+
+
+def _ends(row: Row, other: Row, p_max: float) -> bool:
+    """Return whether a curve is at one of two frequencies alone, unless it is about to leave."""
+    for m in (1, -1):
+        amplitudes = [np.array(r.p)[np.array(r.multiplier) == m] for r in (row, other)]
+        short, long = sorted(amplitudes, key=np.size)
+        if long.size > short.size + 1 or (long.size > short.size and long[-1] < _TOP * p_max):
+            return True
+    return False
 
 
 def in_plane(omega: Floats, p: Floats, plane: str) -> tuple[Floats, Floats]:
