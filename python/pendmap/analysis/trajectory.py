@@ -214,12 +214,11 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
 def _starts(theta: ArrayLike, velocity: ArrayLike) -> tuple[Floats, Floats]:
     """Return angles and velocities of the starts; a number as often as the other's values."""
     shape = np.shape(theta) or np.shape(velocity) or (1,)
-    angles, speeds = grid.starts(
-        *(
-            value if np.ndim(value) else np.full(shape, errors.check_number(name, value))
-            for name, value in (("theta", theta), ("velocity", velocity))
-        )
-    )
+    arrays = [
+        value if np.ndim(value) else np.full(shape, errors.check_number(name, value))
+        for name, value in (("theta", theta), ("velocity", velocity))
+    ]
+    angles, speeds = grid.starts(*arrays)
     if not angles.size:
         raise errors.InputError("theta must have one start or more, got none")
     return angles, speeds
@@ -265,10 +264,8 @@ def _samples(
         samples = max(samples, int(min(smooth, _SMOOTH_SAMPLES // periods)) // count)
     samples = errors.check_whole("samples", samples, 1, errors.MOST_SAMPLES)
     if periods * samples * count > 100 * _MOST_SAMPLES:
-        raise errors.InputError(
-            f"until must be shorter: {periods:.3g} periods of {samples} samples do not fit into "
-            "memory"
-        )
+        text = f"{periods:.3g} periods of {samples} samples do not fit into memory"
+        raise errors.InputError(f"until must be shorter: {text}")
     return samples
 
 
@@ -376,9 +373,7 @@ def _summary(dataset: xr.Dataset, units: Units) -> list[str]:
         ever = ", permanently" if kinds[-1] == "stuck for ever" else ""
         lines.append(f"Friction holds it since {units.at(format(times[-1], '.9g'))}{ever}.")
     if a["end_error"] > max(1e-3, a["tol"]):
-        lines.append(
-            "The end is not predictable at this length: read the motion, not its last state."
-        )
+        lines.append("The end is not predictable: read the motion, not its last state.")
     if "exponent" in a:
         lines.append(
             "Largest Lyapunov exponent of this stretch, the first tenth left out: "
@@ -391,8 +386,7 @@ def _summary(dataset: xr.Dataset, units: Units) -> list[str]:
 def energy(theta: Floats, velocity: Floats, attributes: Any) -> Floats:  # noqa: ANN401 (a mapping)
     """Return ``E / (m g l) = v^2 / 2 + 1 - cos theta``, ``v = d theta / d tau`` about the pivot."""
     speed = Units.of(attributes).bare(velocity, VELOCITY)
-    energies: Floats = 0.5 * speed**2 + 1.0 - np.cos(theta)
-    return energies
+    return np.asarray(0.5 * speed**2 + 1.0 - np.cos(theta))
 
 
 def advance(  # noqa: PLR0913 (as for basins)
