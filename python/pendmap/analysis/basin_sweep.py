@@ -19,21 +19,16 @@ from pendmap.analysis.sweeps import report
 from pendmap.analysis.sweeps.branches import branches
 from pendmap.analysis.sweeps.table import sweep_dataset
 from pendmap.analysis.sweeps.tiles import SweepTiles
-from pendmap.engine import Layout
 from pendmap.errors import InputError, short_repr
 from pendmap.model import without_dimensions
 from pendmap.units import VELOCITY
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     import xarray as xr
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
-    from pendmap.analysis.along import Varied
     from pendmap.analysis.run import Keywords
-    from pendmap.analysis.sweeps.table import Numbers
-    from pendmap.engine import Store, Work
+    from pendmap.engine import Work
     from pendmap.model import Pendulum, Rig
 
 DEFAULT_CELLS: Final = 100  # Default number of cells on each side of a map
@@ -175,17 +170,15 @@ def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     job = SweepTiles(bare, tuple(axis.kernel for axis in axes), grid.bare(units), choices)
     job = job.on(*run.tiles(job.blocks))
     models = math.prod(job.shape)
-    if run.store is None:
-        _core.reckon("starts", models * grid.cells, _BYTES)
+    _core.reckon("starts", models * grid.cells, _BYTES)
 
-    def compute(work: Work) -> tuple[xr.Dataset, list[str]]:
-        layout = _layout(job, axes, grid)
-        work.store.create(layout)
+    def compute(work: Work) -> xr.Dataset:
         maps = job.run(work)
         numbers = branches(job, maps)
-        for tile in range(layout.tiles):
-            work.store.write(tile, {"label": _labels(job, work.store, numbers, layout, tile)})
-        label = work.store.whole("label")
+        label = np.zeros((*job.shape, grid.velocity.count, grid.theta.count), dtype=np.int16)
+        for place, one in job.labels(work.store):
+            moved = np.array([-1, 0, *(k + 1 for k in numbers[place])], dtype=np.int16)
+            label[place] = moved[one + 1].reshape(label.shape[-2:])
         dataset = sweep_dataset(maps, numbers, axes, grid, units, label)
         values = {
             **numerics.provenance(),
@@ -205,7 +198,7 @@ def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         dataset.attrs["title"] = varied.title(pendulum, *axes)
         lines = [*report.summary(dataset), *varied.remarks(pendulum, *axes)]
         summarised(dataset, lines, pendulum, "basins are")
-        return dataset, ["label"]
+        return dataset
 
     request = {
         **numerics.request,
@@ -215,23 +208,3 @@ def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         "check": check,
     }
     return run.complete("sweep", pendulum, request, job, compute)
-
-
-def _layout(job: SweepTiles, axes: Sequence[Varied], grid: Grid) -> Layout:
-    """Return the array of the labels; a tile is as long as a block."""
-    dims = (*(axis.name for axis in axes), "velocity", "theta")
-    shape = (*job.shape, grid.velocity.count, grid.theta.count)
-    return Layout(dims, shape, min(job.side[0], job.shape[0]), {"label": "int16"})
-
-
-def _labels(
-    job: SweepTiles, store: Store, numbers: Numbers, layout: Layout, tile: int
-) -> NDArray[np.int16]:
-    """Return the labels of a tile by the numbers of the whole sweep."""
-    rows = layout.rows(tile)
-    labels = np.zeros((rows.stop - rows.start, *layout.shape[1:]), dtype=np.int16)
-    for place, label in job.labels(store, tile):
-        moved = np.array([-1, 0, *(k + 1 for k in numbers[place])], dtype=np.int16)
-        here = (place[0] - rows.start, *place[1:])
-        labels[here] = moved[label + 1].reshape(layout.shape[-2:])
-    return labels

@@ -17,11 +17,11 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap import _core
-from pendmap.engine import Layout, Tile, pack, unpack
+from pendmap.engine import pack, unpack
 from pendmap.errors import core_errors
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator
 
     from numpy.typing import NDArray
 
@@ -40,9 +40,9 @@ _TILES: Final = 64  # Least number of tiles of a map of larger ones: workers end
 _BOX: Final = 5  # Tiles begin with a row of boxes of the basin entropy
 _SAMPLE: Final = 256  # Largest number of undecided starts from which a further search begins
 _CELLS: Final = {"label": "int16", "settle_periods": "int32", "net_turns": "int32"}
-_FOLDER: Final = "work/"  # Beginning of the names of cells that are not the last ones
 _EXPONENT: Final = {"finite_time_exponent": "float32"}
 _BYTES: Final = 32  # Memory of a start during the computation
+_DONE: Final = 16  # Memory of a start of a map in tiles
 _STILL: Final = 1e-12  # Largest sine of an angle at rest
 _TEXTURE: Final = (
     "basin_entropy",
@@ -102,11 +102,6 @@ class Starts:
         return self.theta[first:last], self.velocity[first:last]
 
     @property
-    def lost(self) -> bool:
-        """Whether the states of the list are not in this process."""
-        return self.axes is None and self.theta.size != self.shape[0]
-
-    @property
     def dims(self) -> tuple[str, ...]:
         """Dimensions of these arrays."""
         return ("start",) if self.axes is None else ("velocity", "theta")
@@ -144,22 +139,24 @@ class BasinTiles:
     """Exponents of the model for one without dimensions."""
     cells: int | None = None
     """Number of starts of a tile; None for a single tile."""
-    part_of_result: bool = True
-    """Whether the labels are cells of the result, not what another analysis is made from."""
     threads: int | None = None
     """Threads of a tile; by default those of the choices, which the search and the checks have."""
     at_once: int = 1
     """Number of tiles that this process computes at once."""
 
     @property
-    def _last(self) -> str:
-        """Beginning of the names of the cells with their last numbers in a store."""
-        return "" if self.part_of_result else f"{_FOLDER}last-"
-
-    @property
     def height(self) -> int:
         """Number of rows of a tile."""
         return self.starts.shape[0] if self.cells is None else self.starts.height(self.cells)
+
+    @property
+    def tiles(self) -> int:
+        """Number of tiles."""
+        return -(-self.starts.shape[0] // self.height)
+
+    def rows(self, tile: int) -> slice:
+        """Return the rows of a tile."""
+        return slice(tile * self.height, min((tile + 1) * self.height, self.starts.shape[0]))
 
     def plan(
         self,
@@ -179,13 +176,7 @@ class BasinTiles:
 
     def inputs(self, store: Store, step: str, tile: int) -> tuple[Any, Indices]:
         """Return the starts of a tile, and the indices of the undecided ones."""
-        first, last = self._first(tile), self._first(tile + 1)
-        record = store.get(f"starts/{tile}") if self.starts.lost else None
-        if record is None:
-            starts = self.starts.of_tile(first, last)
-        else:
-            states = unpack(record)
-            starts = (states["theta"], states["velocity"])
+        starts = self.starts.of_tile(self._first(tile), self._first(tile + 1))
         if step == "label":
             return starts, np.zeros(0, np.int64)
         return starts, self._undecided(store, int(step.removeprefix("again-")), tile)
@@ -197,7 +188,7 @@ class BasinTiles:
         tile: int,
         inputs: tuple[Any, Indices],
         progress: Any = None,  # noqa: ANN401
-    ) -> Tile:
+    ) -> dict[str, NDArray[Any]]:
         """Label the starts of a tile, or its undecided ones again."""
         starts, picks = inputs
         plan = self.plan(state, starts)
@@ -206,7 +197,7 @@ class BasinTiles:
         if step != "label":
             labelled = plan.label_again(picks - before, progress)
             arrays = {"label": labelled.label, "settle": labelled.settle, "turns": labelled.turns}
-            return Tile(pack(picks=picks, work=labelled.work, **arrays))
+            return pack(picks=picks, work=labelled.work, **arrays)
         labelled = plan.label(first - before, last - before, progress)
         cells: Cells = dict(
             zip(_CELLS, (labelled.label, labelled.settle, labelled.turns), strict=True)
@@ -214,9 +205,8 @@ class BasinTiles:
         if labelled.finite_time_exponent is not None:
             exponent = labelled.finite_time_exponent * np.float32(self.rate)
             cells["finite_time_exponent"] = exponent
-        return Tile(
-            pack(work=labelled.work, undecided=np.count_nonzero(labelled.label == 0)), _named(cells)
-        )
+        undecided = np.count_nonzero(labelled.label == 0)
+        return pack(work=labelled.work, undecided=undecided, **cells)
 
     def _first(self, tile: int) -> int:
         """Return the index of the first start of a tile."""
@@ -231,28 +221,20 @@ class BasinTiles:
             arrays = unpack(record)
             picks: Indices = arrays["picks"][arrays["label"] == 0]
             return picks
-        rows = slice(tile * self.height, (tile + 1) * self.height)
-        return np.flatnonzero(store.read(f"{_FOLDER}label", rows) == 0) + self._first(tile)
+        label = unpack(store.get(f"label/{tile}") or {})["label"]
+        return np.flatnonzero(label == 0) + self._first(tile)
 
     # ---- the whole
 
     def run(self, work: Work, *, check: bool) -> SimpleNamespace:
         """Compute what is missing; return attractors and measures by the names of the schema."""
         store, shape = work.store, self.starts.shape
-        if not store.shared:
-            _core.reckon("starts", math.prod(shape), _BYTES)
+        _core.reckon("starts", math.prod(shape), _BYTES if self.cells is None else _DONE)
         plan = self.plan(work.once("plan-0", lambda: self.plan(progress=work.progress).state))
         labelled = plan.plane == "basins"
-        dtypes = _CELLS | ({} if labelled else _EXPONENT)
-        layout = Layout(self.starts.dims, shape, self.height, _named(dtypes), "label")
-        store.create(layout)
-        if store.shared and self.starts.axes is None:
-            for tile in range(layout.tiles):
-                theta, velocity = self.starts.of_tile(self._first(tile), self._first(tile + 1))
-                work.once(f"starts/{tile}", partial(pack, theta=theta, velocity=velocity))
-        undecided = np.zeros(layout.tiles, np.int64)
+        undecided = np.zeros(self.tiles, np.int64)
         periods = 0
-        for tile, record in work.each("label", "plan-0", range(layout.tiles)):
+        for tile, record in work.each("label", "plan-0", range(self.tiles)):
             arrays = unpack(record)
             undecided[tile] = int(arrays["undecided"])
             periods += int(arrays["work"])
@@ -270,11 +252,12 @@ class BasinTiles:
                 arrays = unpack(record)
                 undecided[tile] = np.count_nonzero(arrays["label"] == 0)
                 periods += int(arrays["work"])
-        measure = partial(self._measures, plan, store, layout, moves, check=check)
+        measure = partial(self._measures, plan, store, moves, check=check)
         measures = unpack(work.once("measures", measure))
         counts = measures.pop("counts")
         attractors, last = plan.finish(np.ascontiguousarray(counts[2:]))
-        final = self._renumber(work, layout, [*moves, last])
+        if moves or not np.array_equal(last, np.arange(1, last.size + 1)):
+            moves.append(last)
         share = counts[:2] / math.prod(shape)
         uncertain = {
             name: measures.pop(name, np.zeros(0)) for name in ("eps", "uncertain", "tried")
@@ -285,7 +268,7 @@ class BasinTiles:
             **{name: getattr(plan, name) for name in _PLAN},
             **dict.fromkeys(_RELIABILITY, 0.0) | {"unreliable_mirror": None} | measures,
             attractors=attractors,
-            cells={name: store.whole(f"{final}{name}") for name in dtypes},
+            cells=self._final(store, moves),
             failed=share[0].item(),
             undecided=1.0 if plan.plane == "conservative" else share[1].item(),
             decided=int(counts[2:].sum()),
@@ -294,7 +277,9 @@ class BasinTiles:
             uncertainty=uncertain,
         )
 
-    def _search(self, plan: _core.BasinPlan, store: Store, undecided: Indices, again: int) -> bytes:
+    def _search(
+        self, plan: _core.BasinPlan, store: Store, undecided: Indices, again: int
+    ) -> dict[str, NDArray[Any]]:
         """Search from undecided starts; return the next plan, none if labels are final."""
         stride = -(-int(undecided.sum()) // _SAMPLE)
         before = np.cumsum(undecided) - undecided
@@ -310,13 +295,15 @@ class BasinTiles:
             return pack(final=1)
         return pack(moved=moved, state=np.frombuffer(plan.state, np.uint8))
 
-    def _merged(self, store: Store, layout: Layout, moves: list[Labels], tile: int) -> Cells:
+    def _merged(self, store: Store, moves: list[Labels], tile: int) -> Cells:
         """Return the cells of a tile with what the steps ``again`` have found.
 
         Entry ``k`` of ``moves`` has the new number of each attractor after step ``k``.
         """
-        rows, cut = layout.rows(tile), len(_FOLDER)
-        cells = {name[cut:]: store.read(name, rows) for name in layout.dtypes}
+        shape = (-1, *self.starts.shape[1:])
+        arrays = unpack(store.get(f"label/{tile}") or {})
+        names = [name for name in (*_CELLS, *_EXPONENT) if name in arrays]
+        cells = {name: arrays[name].reshape(shape) for name in names}
         if moves:
             cells = {name: values.copy() for name, values in cells.items()}
         flat = {name: values.reshape(-1) for name, values in cells.items()}
@@ -331,13 +318,11 @@ class BasinTiles:
                     flat[name][at] = arrays[key]
         return cells
 
-    def _blocks(
-        self, store: Store, layout: Layout, moves: list[Labels]
-    ) -> Iterator[tuple[slice, Cells]]:
+    def _blocks(self, store: Store, moves: list[Labels]) -> Iterator[tuple[slice, Cells]]:
         """Yield rows and cells, a few rows at a time."""
         few = self.starts.height(TILE)
-        for tile in range(layout.tiles):
-            cells, rows = self._merged(store, layout, moves, tile), layout.rows(tile)
+        for tile in range(self.tiles):
+            cells, rows = self._merged(store, moves, tile), self.rows(tile)
             for first in range(rows.start, rows.stop, few):
                 last = min(first + few, rows.stop)
                 part = slice(first - rows.start, last - rows.start)
@@ -347,13 +332,12 @@ class BasinTiles:
         self,
         plan: _core.BasinPlan,
         store: Store,
-        layout: Layout,
         moves: list[Labels],
         *,
         check: bool,
-    ) -> bytes:
+    ) -> dict[str, NDArray[Any]]:
         """Return what the whole map tells."""
-        rows, row = layout.shape[0], self.starts.row
+        rows, row = self.starts.shape[0], self.starts.row
         labelled = plan.plane == "basins"
         grid, check = labelled and self.starts.axes is not None, labelled and check
         picks = plan.checked_starts() if check else np.zeros(0, np.int64)
@@ -364,7 +348,7 @@ class BasinTiles:
         settled, periods, longest, moving = 0, 0, -1, 0
         texture = _core.TextureSum(row, rows)
         before = np.zeros((0, row), np.int16)
-        for at, cells in self._blocks(store, layout, moves):
+        for at, cells in self._blocks(store, moves):
             settle = cells["settle_periods"][cells["settle_periods"] >= 0]
             settled += settle.size
             periods += int(settle.sum())
@@ -400,25 +384,14 @@ class BasinTiles:
             **{name: value for name, value in measures.items() if value is not None},
         )
 
-    def _renumber(self, work: Work, layout: Layout, moves: list[Labels]) -> str:
-        """Give attractors their last numbers, and starts what later steps have found.
-
-        Returns the beginning of the names of the cells. In a store they are other cells than those
-        of the steps: nothing is written over.
-        """
-        store, last = work.store, moves[-1]
-        if len(moves) == 1 and np.array_equal(last, np.arange(1, last.size + 1)):
-            moves = []
-        name = self._last if store.shared else _FOLDER
-        if store.shared:
-            dtypes = {f"{name}{key[len(_FOLDER) :]}": dtype for key, dtype in layout.dtypes.items()}
-            store.create(dataclasses.replace(layout, dtypes=dtypes, step="last"))
-        for tile in range(layout.tiles) if store.shared or moves else ():
-            cells = self._merged(store, layout, moves, tile)
-            store.write(tile, {f"{name}{key}": values for key, values in cells.items()})
-        return name
-
-
-def _named(cells: Mapping[str, Any]) -> dict[str, Any]:
-    """Return cells by their names in the store before attractors have their last numbers."""
-    return {f"{_FOLDER}{name}": values for name, values in cells.items()}
+    def _final(self, store: Store, moves: list[Labels]) -> Cells:
+        """Return the cells of the map with the last numbers of the attractors."""
+        if self.tiles == 1:
+            return self._merged(store, moves, 0)
+        cells: Cells = {}
+        for tile in range(self.tiles):
+            for name, values in self._merged(store, moves, tile).items():
+                if name not in cells:
+                    cells[name] = np.empty(self.starts.shape, values.dtype)
+                cells[name][self.rows(tile)] = values
+        return cells

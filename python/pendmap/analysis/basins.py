@@ -243,7 +243,7 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     angle, speed = grid.theta, grid.velocity
     long_name = f"initial velocity {units.derivative}"
 
-    def compute(work: Work) -> tuple[xr.Dataset, list[str]]:
+    def compute(work: Work) -> xr.Dataset:
         raw = job.run(work, check=check)
         cells = cells_of(raw, job.starts.dims, units)
         dataset = xr.Dataset(
@@ -253,7 +253,7 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
                 **coordinate("velocity", speed.centres, speed.edges, units.of_velocity, long_name),
             },
         )
-        return _complete(dataset, raw, pendulum, numerics), [*cells]
+        return _complete(dataset, raw, pendulum, numerics)
 
     request = {
         **numerics.request,

@@ -143,7 +143,7 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     limits = (numerics.tol, numerics.max_periods)
     job = SurveyTiles(bare, (axis.kernel,), search.initial(units), limits)
 
-    def compute(work: Work) -> tuple[xr.Dataset, list[str]]:
+    def compute(work: Work) -> xr.Dataset:
         with core_errors():
             survey, blocks = job.run(work, run)
             raw = survey.diagram(blocks, first)
@@ -158,7 +158,7 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
         dataset.attrs["title"] = varied.title(pendulum, axis)
         lines = [*_summary(dataset), *varied.remarks(pendulum, axis)]
         summarised(dataset, lines, pendulum, "attractors are")
-        return dataset, []
+        return dataset
 
     request = {"ranges": varied.requested([axis], ranges), "start": start, **search.request}
     return run.complete("bifurcation", pendulum, request, job, compute)

@@ -177,11 +177,15 @@ def lifetime(  # noqa: PLR0913 (numerical choices by name)
     choices = choices_of(numerics, None, check=False)
     cells = tile_of(angles.size, TILE) if run.tiled else None
     rate, threads = units.given(1.0, RATE), run.tiles(1)[0]
-    job = BasinTiles(bare, states, choices, rate, cells, part_of_result=False, threads=threads)
+    job = BasinTiles(bare, states, choices, rate, cells, threads=threads)
 
-    def compute(work: Work) -> tuple[xr.Dataset, list[str]]:
+    def compute(work: Work) -> xr.Dataset:
         basin_map = ends_of_list(job, work, speeds, pendulum, numerics, check=False)
+<<<<<<< HEAD
         return _complete(basin_map, pendulum, numerics, from_period), []
+=======
+        return _complete(basin_map, pendulum, numerics, from_period, window)
+>>>>>>> main
 
     return run.complete("lifetime", pendulum, request, job, compute)
 

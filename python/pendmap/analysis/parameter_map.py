@@ -204,7 +204,7 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     axes, initial = (columns.kernel, rows.kernel), search.initial(units)
     job = SurveyTiles(bare, axes, initial, (numerics.tol, numerics.max_periods))
 
-    def compute(work: Work) -> tuple[xr.Dataset, list[str]]:
+    def compute(work: Work) -> xr.Dataset:
         with core_errors():
             survey, blocks = job.run(work, run)
             raw = survey.result(blocks)
@@ -221,7 +221,7 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
         dataset.attrs["title"] = varied.title(pendulum, columns, rows)
         lines = [*_summary(dataset), *varied.remarks(pendulum, columns, rows)]
         summarised(dataset, lines, pendulum, "attractors are")
-        return dataset, []
+        return dataset
 
     request = {
         "ranges": varied.requested([columns, rows], ranges),

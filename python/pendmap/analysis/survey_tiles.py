@@ -13,7 +13,6 @@ import pickle
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap import _core
-from pendmap.engine import Tile
 from pendmap.errors import core_errors
 
 if TYPE_CHECKING:
@@ -63,15 +62,15 @@ class SurveyTiles:
         tile: int,
         inputs: dict[int, bytes],
         progress: Any = None,  # noqa: ANN401
-    ) -> Tile:
+    ) -> bytes:
         """Search a block, or exchange with the blocks around it."""
         survey, number = _restored(pickle.dumps(self), state), _number(step)
         with core_errors():
             if step == _SEARCH:
-                return Tile(_GAINED[True] + survey.search(tile, progress=progress))
+                return _GAINED[True] + survey.search(tile, progress=progress)
             exchanged = survey.exchange(number, tile, inputs, progress=progress)
             gained = survey.gained(number, tile, exchanged or inputs[tile])
-        return Tile(_GAINED[gained] + (exchanged or b""))
+        return _GAINED[gained] + (exchanged or b"")
 
     def run(self, work: Work, run: RunOptions) -> tuple[_core.Survey, list[bytes]]:
         """Compute the blocks that are missing; return the survey and the last result of each."""

@@ -19,7 +19,7 @@ from pendmap.analysis.fractality import uncertainty_exponent
 from pendmap.analysis.orbit_table import DESCRIBED
 from pendmap.analysis.run import part
 from pendmap.analysis.varied import with_values
-from pendmap.engine import Tile, pack, unpack
+from pendmap.engine import pack, unpack
 from pendmap.errors import InputError, core_errors
 
 if TYPE_CHECKING:
@@ -134,7 +134,7 @@ class SweepTiles:
         tile: int,
         inputs: Any,  # noqa: ANN401, ARG002
         progress: Any = None,  # noqa: ANN401
-    ) -> Tile:
+    ) -> dict[str, NDArray[Any]]:
         """Map the basins of all models of a block."""
         places, plan = self.places(tile), None
         maps: list[_Map] = []
@@ -147,7 +147,7 @@ class SweepTiles:
                 plan = _core.BasinPlan(model, self.axes, self.choices, None, search, plan)
                 one.take(plan, labels, check=self.choices["check"] and k == 0)
             maps.append(one)
-        return Tile(_packed(maps))
+        return _packed(maps)
 
     def run(self, work: Work) -> dict[Place, Mapped]:
         """Compute the blocks that are missing; return the maps of all by their places."""
@@ -157,11 +157,10 @@ class SweepTiles:
             maps |= _of_block(self, tile, record)
         return {place: maps[place] for tile in range(self.blocks) for place in self.places(tile)}
 
-    def labels(self, store: Store, row: int) -> Iterator[tuple[Place, NDArray[np.int16]]]:
-        """Yield the labels of the blocks in a row along the first parameter, by their places."""
-        across = math.prod(self._blocks[1:])
-        for tile in range(row * across, (row + 1) * across):
-            label = unpack(store.get(f"{STEP}/{tile}") or b"")["label"]
+    def labels(self, store: Store) -> Iterator[tuple[Place, NDArray[np.int16]]]:
+        """Yield the labels of all maps by their places."""
+        for tile in range(self.blocks):
+            label = unpack(store.get(f"{STEP}/{tile}") or {})["label"]
             yield from zip(self.places(tile), label, strict=True)
 
 
@@ -210,7 +209,7 @@ class _Map:
         return {"exponent": law.value, "exponent_stderr": law.stderr}
 
 
-def _packed(maps: list[_Map]) -> bytes:
+def _packed(maps: list[_Map]) -> dict[str, NDArray[Any]]:
     """Return the maps of a block as a record."""
     every = [(k, a) for k, one in enumerate(maps) for a in one.attractors]
     number = [k + 1 for one in maps for k in range(len(one.attractors))]
@@ -281,7 +280,11 @@ class Mapped:
     found: list[Found]
 
 
-def _of_block(job: SweepTiles, tile: int, data: bytes) -> Iterator[tuple[Place, Mapped]]:
+def _of_block(
+    job: SweepTiles,
+    tile: int,
+    data: Any,  # noqa: ANN401 (a record)
+) -> Iterator[tuple[Place, Mapped]]:
     read = unpack(data)
     ends = np.cumsum(read["count"])
     keys = [field.name for field in dataclasses.fields(Found)][:-1]
