@@ -181,11 +181,7 @@ def lifetime(  # noqa: PLR0913 (numerical choices by name)
 
     def compute(work: Work) -> xr.Dataset:
         basin_map = ends_of_list(job, work, speeds, pendulum, numerics, check=False)
-<<<<<<< HEAD
-        return _complete(basin_map, pendulum, numerics, from_period), []
-=======
-        return _complete(basin_map, pendulum, numerics, from_period, window)
->>>>>>> main
+        return _complete(basin_map, pendulum, numerics, from_period)
 
     return run.complete("lifetime", pendulum, request, job, compute)
 

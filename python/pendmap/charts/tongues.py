@@ -8,12 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-<<<<<<< HEAD
-from pendmap.analysis.tongues import NEAR, PLANES, in_plane, window
-=======
-from pendmap.analysis.critical_curves import in_plane, window
-from pendmap.analysis.tongues import NEAR
->>>>>>> main
+from pendmap.analysis.tongues import NEAR, in_plane, window
 from pendmap.charts import names
 from pendmap.charts.chart import Axis, Chart, Panel
 from pendmap.charts.marks import QUIET, Areas, Line, Mark, Points, Text, this_pendulum, together
@@ -139,28 +134,8 @@ def _asymptotic(dataset: xr.Dataset, to: Callable[[Floats], Floats]) -> list[Mar
     return drawn
 
 
-<<<<<<< HEAD
-def by_frequency(dataset: xr.Dataset, prefix: str, count: int) -> list[list[tuple[float, int]]]:
-    """Return amplitude and multiplier of the critical points of each frequency."""
-    result: list[list[tuple[float, int]]] = [[] for _ in range(count)]
-    columns = (dataset[f"{prefix}{name}"].values for name in ("index", "p", "multiplier"))
-    for index, p, multiplier in zip(*columns, strict=True):
-        result[int(index)].append((float(p), int(multiplier)))
-    return result
-=======
-def _bands(dataset: xr.Dataset, prefix: str) -> list[Floats]:
-    """Return the interval of each critical amplitude over draws, as points (omega, p)."""
-    if f"{prefix}p_low" not in dataset:
-        return []
-    low, high = (dataset[f"{prefix}p_{end}"].values for end in ("low", "high"))
-    omega, _ = _points(dataset, prefix)
-    ends = np.stack([np.stack([omega, low], axis=1), np.stack([omega, high], axis=1)], axis=1)
-    return [*ends[np.isfinite(low)]]
-
-
 def joined(omega: Floats, at: Floats, p: Floats) -> list[Floats]:
     """Return lines, each (n, 2), through critical amplitudes ``p`` at frequencies ``at``.
->>>>>>> main
 
     Points at successive frequencies are joined where they continue lines best. Where a curve turns
     back between two frequencies, its neighbouring ends are joined.
