@@ -1,4 +1,4 @@
-"""Write the JSON of 94 commands to a folder, to compare two versions of pendmap bit by bit.
+"""Write the JSON of 92 commands to a folder, to compare two versions of pendmap bit by bit.
 
 Run it once with each version, then compare: ``diff -r before after``.
 
@@ -71,7 +71,6 @@ bifurcation_omega: bifurcation --p 1.2 --vary omega 1.6:2.2:24 --theta-r 0.01 --
 orbit: orbit --p 1.7 --n 1 --w 1 --grid 40 --json
 orbit_2: orbit --p 0.6 --n 2 --grid 40 --json
 orbit_friction: orbit --p 0.6 --theta-r 0.02 --n 2 --grid 30 --json
-orbit_draws: orbit --model drawn.toml --n 2 --grid 24 --draws 4 --json
 lyapunov: lyapunov --p 1.7 --json
 lyapunov_chaos: lyapunov --p 2.0 --gamma 0.1 --theta 0.4 --json
 lyapunov_friction: lyapunov --p 0.6 --theta-r 0.05 --json
@@ -81,7 +80,6 @@ lifetime_draws: lifetime --model drawn.toml --p 1.8 --starts 100 --draws 4 --jso
 tongues: tongues --json
 tongues_plane: tongues --plane e-alpha2 --json
 tongues_window: tongues --gamma 0.05 --omega 0.5:3:40 --json
-tongues_draws: tongues --model smooth.toml --draws 6 --json
 melnikov: melnikov --p 1.7 --json
 melnikov_effects: melnikov --model si.toml --json
 look_decay: look decay --json
@@ -170,8 +168,6 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name, ThreadPoolExecutor(2) as pool:
         folder = Path(name)
         (folder / "si.toml").write_text(SI, encoding="utf-8")
-        smooth = DRAWN.replace("Tr = 0.3\n", "").replace('"c_over_m", "Tr"', '"c_over_m", "w0"')
-        (folder / "smooth.toml").write_text(smooth, encoding="utf-8")
         (folder / "drawn.toml").write_text(DRAWN, encoding="utf-8")
         prepared = [line for line in RIGS.split("\n") if line]
         for line in prepared:

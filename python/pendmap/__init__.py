@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from pendmap.analysis.parameter_map import parameter_map as parameter_map
     from pendmap.analysis.run import RunOptions as RunOptions
     from pendmap.analysis.tongues import tongues as tongues
-    from pendmap.analysis.trajectories import advance as advance
+    from pendmap.analysis.trajectory import advance as advance
     from pendmap.analysis.trajectory import simulate as simulate
     from pendmap.analysis.varied import pendulum_of as pendulum_of
     from pendmap.comparison.experiment import compare as compare
@@ -90,7 +90,7 @@ _OTHERS = {
     "analysis.fractality": "BasinEntropy UncertaintyExponent basin_entropy uncertainty_exponent",
     "analysis.grid": "Axis Grid",
     "analysis.run": "RunOptions",
-    "analysis.trajectories": "advance",
+    "analysis.trajectory": "advance",
     "analysis.varied": "pendulum_of",
     "comparison.experiment": "compare",
     "diagnosis.diagnose": "diagnose",

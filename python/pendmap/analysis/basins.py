@@ -11,8 +11,7 @@ import xarray as xr
 from pendmap.analysis import orbit_table, result
 from pendmap.analysis.basin_dataset import LAYERS, boundary, cells_of, uncertain_starts
 from pendmap.analysis.basin_tiles import TILE, BasinTiles, Starts, tile_of
-from pendmap.analysis.draws import drawn
-from pendmap.analysis.draws.basins import basins_over, drawn_basins
+from pendmap.analysis.draws import basins_over, drawn, drawn_basins
 from pendmap.analysis.grid import Grid, coordinate, starts
 from pendmap.analysis.numerics import Numerics, optional_whole
 from pendmap.analysis.result import Field, Found, Schema, none_below_0

@@ -12,14 +12,10 @@ from scipy.special import gammaincc
 
 from pendmap import _core
 from pendmap.errors import InputError
-from pendmap.formatting import Readable, written
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
     import numpy.typing as npt
 
-    from pendmap.formatting import Table
     from pendmap.signal import Floats
 
     Labels = npt.NDArray[np.int16]
@@ -39,8 +35,8 @@ BOX: Final = 5  # Side of a box of the basin entropy in cells, as in the core
 _MOST_LABELS: Final = 32_767  # Largest number of labels of a map
 
 
-@dataclasses.dataclass(frozen=True, repr=False)
-class UncertaintyExponent(Readable):
+@dataclasses.dataclass(frozen=True)
+class UncertaintyExponent:
     """Exponent of ``f(eps) ~ eps^value``, and the counts that it was fitted to.
 
     Attributes
@@ -49,8 +45,6 @@ class UncertaintyExponent(Readable):
         The exponent and its standard error.
     ci95 : (float, float)
         Its 95 % interval.
-    dimension, dimension_ci95 : float, (float, float)
-        Box-counting dimension ``2 - value`` of the boundary.
     eps : ndarray, shape (N,)
         Distances, ascending, in ``unit``.
     uncertain, tried : ndarray of int, shape (N,)
@@ -64,43 +58,21 @@ class UncertaintyExponent(Readable):
     value: float
     stderr: float
     ci95: tuple[float, float]
-    eps: Floats
-    uncertain: npt.NDArray[np.int64]
-    tried: npt.NDArray[np.int64]
+    eps: Floats = dataclasses.field(repr=False)
+    uncertain: npt.NDArray[np.int64] = dataclasses.field(repr=False)
+    tried: npt.NDArray[np.int64] = dataclasses.field(repr=False)
     unit: str
     scales: int
 
     @property
     def dimension(self) -> float:
-        """Box-counting dimension of the boundary."""
+        """Box-counting dimension ``2 - value`` of the boundary."""
         return 2.0 - self.value
-
-    @property
-    def dimension_ci95(self) -> tuple[float, float]:
-        """95 % interval of the dimension."""
-        return 2.0 - self.ci95[1], 2.0 - self.ci95[0]
 
     @property
     def share(self) -> Floats:
         """``f(eps)``, shape (N,)."""
         return np.asarray(self.uncertain / np.maximum(self.tried, 1))
-
-    def __repr__(self) -> str:
-        return f"UncertaintyExponent({self._value})"
-
-    def text_parts(self) -> tuple[Sequence[Table], Iterable[str]]:
-        """Return the shares as a table, and the exponent."""
-        rows = [
-            [f"{eps:.3g}", f"{share:.4g}", "yes" if k < self.scales else ""]
-            for k, (eps, share) in enumerate(zip(self.eps, self.share, strict=True))
-        ]
-        table = [f"eps ({self.unit})", "uncertain share", "fitted"], rows
-        return [table], [f"Uncertainty exponent {self._value}, dimension {self.dimension:.4g}."]
-
-    @property
-    def _value(self) -> str:
-        low, high = (written(end, self.stderr) for end in self.ci95)
-        return f"{written(self.value, self.stderr)} [{low}, {high}]"
 
 
 def uncertainty_exponent(
@@ -114,9 +86,7 @@ def uncertainty_exponent(
     alpha is small, much more precise starts hardly improve the prediction of ends.
 
     For a dataset of :func:`pendmap.basins` the counts are those of the map, of independent starts
-    for each distance, in directions drawn at random, down to 1.5e-8 of the window's sides. Where
-    the map shows every change of label that a pilot sample meets, most starts are drawn near those,
-    each with its weight, and the counts are the equivalent numbers of starts drawn evenly. For
+    for each distance, in directions drawn at random, down to 1.5e-8 of the window's sides. For
     labels on a grid the distances are 1, 2, 3, 4, 6, ... cells, along both axes at once, from every
     cell; filaments thinner than a cell are not resolved.
 
@@ -124,8 +94,7 @@ def uncertainty_exponent(
     misfit less likely than 1 %), and the interval is widened by the remaining misfit. On a grid
     neighbouring cells are not independent: their effective number follows from the spread between
     strips of the plane; at an edge that is not periodic the plane is continued by reflection.
-    Starts with an unknown end nearby, undecided or failed, are left out. Attractors that are mirror
-    images of one another count as two.
+    Starts with an unknown end nearby are left out; mirror images count as two attractors.
 
     Parameters
     ----------
@@ -192,18 +161,10 @@ def fitted(
         if degrees <= 1 or few or gammaincc(degrees / 2, misfit / 2) > _UNLIKELY:
             break
         scales -= 1
-    wide = max(1.0, misfit / degrees) if degrees > 0 else 1.0
-    error *= math.sqrt(wide)
-    return UncertaintyExponent(
-        value=value,
-        stderr=error,
-        ci95=(value - _TIMES * error, value + _TIMES * error),
-        eps=far,
-        uncertain=hit.astype(np.int64),
-        tried=all_.astype(np.int64),
-        unit=unit,
-        scales=scales,
-    )
+    error *= math.sqrt(max(1.0, misfit / degrees)) if degrees > 0 else 1.0
+    ci95 = (value - _TIMES * error, value + _TIMES * error)
+    counts = hit.astype(np.int64), all_.astype(np.int64)
+    return UncertaintyExponent(value, error, ci95, far, *counts, unit, scales)
 
 
 def _law(eps: Floats, hit: Floats, tried: Floats) -> tuple[float, float, float, int]:
@@ -277,16 +238,13 @@ def fitted_map(dataset: xr.Dataset) -> UncertaintyExponent | None:
 
 
 def _of_map(dataset: xr.Dataset) -> UncertaintyExponent:
-    if "uncertainty_eps" not in dataset:
+    """Return the uncertainty exponent of a whole map with counts, or raise InputError."""
+    whole = "label" in dataset and dataset["label"].size == dataset.attrs["cells"]
+    if not (whole and "uncertainty_eps" in dataset):
         raise InputError(
-            "this dataset has no counts of uncertain starts: it must be a map of pendmap.basins "
-            "of 10,000 cells or more whose labels distinguish basins, made with check=True; or "
-            "dataset['label']"
-        )
-    if dataset["label"].size != dataset.attrs["cells"]:
-        raise InputError(
-            "this is a part of a map, and the counts of uncertain starts are of the whole: it must "
-            "be the whole map, or labels on a grid, dataset['label']"
+            "this dataset has no counts of uncertain starts of all its cells: it must be a whole "
+            "map of pendmap.basins of 10,000 cells or more whose labels distinguish basins, made "
+            "with check=True; or labels on a grid, dataset['label']"
         )
     fit = fitted_map(dataset)
     if fit is None:
@@ -302,10 +260,9 @@ class BasinEntropy:
     ----------
     value : float
         Basin entropy: the mean over all boxes.
-    boundary : float
-        Boundary basin entropy: the mean over the boxes that hold more than one label; 0 without.
-    boundary_stderr : float
-        Its standard error, from the spread over those boxes; infinite with fewer than two.
+    boundary, boundary_stderr : float
+        Boundary basin entropy: the mean over the boxes that hold more than one label, 0 without;
+        its standard error, from the spread over those boxes, infinite with fewer than two.
     boxes, boundary_boxes : int
         Numbers of all boxes, and of those with more than one label.
     """
@@ -318,7 +275,7 @@ class BasinEntropy:
 
     @property
     def is_fractal(self) -> bool:
-        """Whether ``boundary`` exceeds ``ln 2`` by two standard errors: the boundary is fractal."""
+        """Whether ``boundary`` exceeds ``ln 2`` by two standard errors."""
         return passes_log2(self.boundary, self.boundary_stderr)
 
 
@@ -329,17 +286,14 @@ def basin_entropy(labels: npt.ArrayLike | xr.Dataset) -> BasinEntropy:
     entropy is ``S_b = sum S_i / N`` over all N boxes, boundary basin entropy
     ``S_bb = sum S_i / N_b`` over the N_b boxes with more than one label. ``S_b`` measures how
     unpredictable ends are: 0 in one basin, ``ln K`` where K labels are spread at random. On a
-    smooth boundary at most few boxes hold more than two labels, and ``S_bb`` is below ``ln 2``;
-    above it the boundary is fractal. Below it nothing follows: many fractal boundaries have such a
-    value, and all of those between two labels. Both depend on the size of a cell; compare maps with
-    cells of one size.
+    smooth boundary ``S_bb`` is below ``ln 2``; above it the boundary is fractal. Below it nothing
+    follows. Both depend on the size of a cell; compare maps with cells of one size.
 
     Parameters
     ----------
     labels : array_like of int, shape (M, N), or xarray.Dataset
         A basin map; or numbers of attractors from 1; 0 and below where the end is not known. Those
-        cells are left out, as are cells beyond the last whole box; below 5 cells a side the whole
-        side is a box. Attractors that are mirror images of one another count as two.
+        cells are left out, as are cells beyond the last whole box; mirror images count as two.
 
     Returns
     -------
@@ -371,14 +325,9 @@ def basin_entropy(labels: npt.ArrayLike | xr.Dataset) -> BasinEntropy:
     cells = _numbered(labels)
     texture = _core.TextureSum(cells.shape[1], cells.shape[0])
     texture.add(np.ascontiguousarray(cells).ravel())
-    measures = texture.total()
-    return BasinEntropy(
-        value=measures.basin_entropy,
-        boundary=measures.boundary_basin_entropy,
-        boundary_stderr=measures.boundary_stderr,
-        boxes=measures.boxes,
-        boundary_boxes=measures.boundary_boxes,
-    )
+    total = texture.total()
+    boundary = total.boundary_basin_entropy, total.boundary_stderr
+    return BasinEntropy(total.basin_entropy, *boundary, total.boxes, total.boundary_boxes)
 
 
 def passes_log2(boundary: float, stderr: float) -> bool:

@@ -17,7 +17,7 @@ from pendmap.analysis.summary import effort
 from pendmap.errors import InputError, check_number, core_errors
 from pendmap.files import facts
 from pendmap.files.variables import variable
-from pendmap.formatting import counted
+from pendmap.formatting import counted, with_error
 from pendmap.model import without_dimensions
 from pendmap.units import RATE, TIME, VELOCITY, Units
 
@@ -30,36 +30,26 @@ if TYPE_CHECKING:
 _CLEAR = 3.0
 """Without damping, motion is regular if its exponent is below this multiple of that of deviations
 that grow as tau; the spread of trajectories is then no standard error."""
+_MOST_PRECISION = 0.5  # Largest relative standard error, at which the exponent's sign is certain
+_BY_ROUNDING = math.log(1e10)  # Growth of deviations from which rounding determines the result
 
-_MOST_PRECISION = 0.5
-"""Largest allowed relative standard error, at which the exponent's sign is still certain."""
 
-_BY_ROUNDING = math.log(1e10)
-"""Logarithm of a deviation's growth from which rounding determines the result."""
+def _attractor(dataset: xr.Dataset) -> dict[str, Any] | None:
+    return next(iter(orbit_table.objects(dataset, "attractor")), None)
 
 
 SCHEMA = Schema(
     "lyapunov",
     result.UNITS,
     Found("exponent", result.OF_RATE, "largest Lyapunov exponent", variable="largest_exponent"),
-    Found(
-        "stderr",
-        result.OF_RATE,
-        "its standard error; 0 where it is exact",
-        variable="largest_exponent_stderr",
-    ),
+    Found("stderr", result.OF_RATE, "its error; 0: exact", variable="largest_exponent_stderr"),
     Found("per_period", "1/period", "the exponent per forcing period"),
     Found("per_period_stderr", "1/period", "its standard error"),
     Found("second_exponent", result.OF_RATE, "the other exponent"),
     Found("exponent_sum", result.OF_RATE, "sum of both exponents"),
     Found("kaplan_yorke_dimension", "1", "dimension of the stroboscopic map's attractor"),
     Found("end", "", "captured, chaotic, undamped, undecided or failed"),
-    Field(
-        "attractor",
-        "",
-        "the attractor that was reached",
-        read=lambda d: next(iter(orbit_table.objects(d, "attractor")), None),
-    ),
+    Field("attractor", "", "the attractor that was reached", read=_attractor),
     Found("transient_periods", "periods", "time of capture; -1: none", convert=none_below_0),
     Field("trajectories", "1", "trajectories of the ensemble"),
     Field("periods", "periods", "length of each of them"),
@@ -105,9 +95,8 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
     exponent of the attractor that captures it; ``transient_periods`` is the time of capture.
 
     With friction, a turning point multiplies the deviation's velocity by the ratio of the
-    accelerations after and before it; sticking sets its velocity to 0 and keeps its angle. A motion
-    that sticks has a finite largest exponent, and its second one is minus infinity. A pendulum that
-    friction holds permanently has none: deviations neither grow nor shrink.
+    accelerations after and before it; sticking sets its velocity to 0, and the second exponent is
+    minus infinity. A pendulum that friction holds permanently has no exponent.
 
     Parameters
     ----------
@@ -120,9 +109,8 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
     precision : float
         Ratio of standard error to exponent at which averaging of chaos ends; above 0, up to 0.5.
     max_periods : int, optional
-        Periods within which an attractor must capture the start, and for which each trajectory of
-        an ensemble is followed at most; by default 4000, more where damping is small, and 20,000
-        (without damping 2000).
+        Periods within which an attractor must capture the start, by default 4000, more where
+        damping is small, and for which an ensemble is followed, 20,000 (without damping 2000).
     tol, run
         As for :func:`pendmap.basins`.
 
@@ -205,10 +193,7 @@ def lyapunov(  # noqa: PLR0913 (physics first, numerical choices by name)
 
 
 def _value(raw: _core.Lyapunov, period: float) -> tuple[float, float, float]:
-    """Return the exponent per unit of tau, its standard error, and the one of regular motion.
-
-    The last is that of undamped motion whose deviations grow as tau. Missing values are nan.
-    """
+    """Return the exponent per tau, its error, and that of deviations that grow as tau; or nan."""
     if raw.attractor is not None:
         return raw.attractor.exponent, raw.attractor.exponent_stderr, math.nan
     if raw.ensemble is None or raw.end != "undamped":
@@ -252,24 +237,20 @@ def _growth(raw: _core.Lyapunov, growth: Floats, period: float, units: Units) ->
     time = raw.window * period
     averaged = np.arange(1, windows + 1)
     means: Floats = np.cumsum(growth, axis=1) / (averaged * time)
-    deviation = means.std(axis=0, ddof=1) if count > 1 else np.zeros(windows)
-    stderr = deviation / math.sqrt(max(count, 1))
-    mean = means.mean(axis=0) if count else np.zeros(windows)
+    mean, stderr = np.zeros(windows), np.zeros(windows)
+    if windows:
+        mean, stderr = means.mean(axis=0), means.std(axis=0, ddof=1) / math.sqrt(count)
     elapsed = np.arange(course.size, dtype=np.int32)
     periods = (averaged * raw.window).astype(np.int32)
     rate, lasting = units.of_rate, "time that each trajectory has been averaged for"
+    local, finite = units.given(growth / time, RATE), f"exponent over {raw.window} periods"
     running = "mean exponent of the trajectories up to this time"
     error = "standard error of the mean exponent"
     text = "logarithm of the growth of a deviation along the start's own trajectory"
     return {
         "growth": variable("elapsed", course, "1", text),
         "elapsed": variable("elapsed", elapsed, "periods", "time since the start"),
-        "finite_time_exponent": variable(
-            ("trajectory", "window"),
-            units.given(growth / time, RATE),
-            rate,
-            f"finite-time exponent over {raw.window} periods",
-        ),
+        "finite_time_exponent": variable(("trajectory", "window"), local, rate, finite),
         "running_exponent": variable("window", units.given(mean, RATE), rate, running),
         "running_stderr": variable("window", units.given(stderr, RATE), rate, error),
         "averaged": variable("window", periods, "periods", lasting),
@@ -278,96 +259,55 @@ def _growth(raw: _core.Lyapunov, growth: Floats, period: float, units: Units) ->
 
 def _summary(dataset: xr.Dataset) -> list[str]:
     a = facts(dataset)
-    units = Units.of(a)
-    name = str(dataset["attractor"].values[0]) if dataset.sizes["attractor"] else ""
-    lines = [*_ended(dataset, name)]
-    value, per = a["largest_exponent"], units.per_time
-    if math.isfinite(value) and a["end"] in {"chaotic", "undamped"}:
-        known = math.isfinite(a["largest_exponent_stderr"])
-        exponent_error, whole = (
-            f" +- {a[f'{key}_stderr']:.2g}" if known else ""
-            for key in ("largest_exponent", "per_period")
-        )
-        lines.append(
-            f"Largest Lyapunov exponent {value:.6g}{exponent_error} {per}, "
-            f"{a['per_period']:.6g}{whole} per period: mean over "
-            f"{a['trajectories']} trajectories of "
-            f"{counted(a['periods'], 'period')} each, {a['dropped_periods']} more dropped before."
-        )
-        if not known:
-            lines.append(
-                f"Deviations that grow as tau, those of regular motion, give {a['regular']:.2g} "
-                f"{per} over this time: the exponent is not significantly different from 0."
-            )
-        if value > 0 and a["end"] == "chaotic":
-            lines.append(
-                f"A deviation doubles in {math.log(2) / a['per_period']:.3g} periods on average."
-            )
-        aim = a["precision"] * abs(value)
-        if a["end"] == "chaotic" and a["largest_exponent_stderr"] > aim:
-            lines.append(f"THE PRECISION {a['precision']:g} WAS NOT REACHED: raise --max-periods.")
-    elif math.isfinite(value):
-        pairs = dataset["multipliers"].values
-        exact = "exact, from the multipliers" if not np.isnan(pairs).all() else "exactly"
-        lines.append(
-            f"Largest Lyapunov exponent {value:.9g} {per}, {a['per_period']:.9g} per period: "
-            f"{exact}."
-        )
-    if not (math.isfinite(value) and math.isnan(a["largest_exponent_stderr"])):
-        lines += _other(a, units)
-    return [*lines, effort(a)]
-
-
-def _ended(dataset: xr.Dataset, name: str) -> list[str]:
-    """Return summary lines on how the start's trajectory ended."""
-    a = facts(dataset)
-    units = Units.of(a)
+    units, end, value = Units.of(a), a["end"], a["largest_exponent"]
     speed = units.spoken(format(a["velocity0"], "g"))
-    start = f"From theta = {a['theta0']:g} rad, velocity = {speed}"
-    if a["end"] == "captured":
-        text = f"{start}: {name}, reached after {counted(a['transient_periods'], 'period')}."
-        grown = float(dataset["growth"].values[: a["transient_periods"] + 1].max())
-        if grown > _BY_ROUNDING:
-            text += (
-                f" On the way deviations grow by 1e{grown / math.log(10):.0f}: rounding decides "
-                "when it is reached, and which one where others coexist."
-            )
-        if a["largest_exponent"] == -math.inf:
-            text += " Its exponent is minus infinity: both multipliers are 0."
-        elif math.isnan(a["largest_exponent"]):
-            text += " Friction holds it permanently: deviations neither grow nor decay, and there"
-            text += " is no exponent."
-    else:
-        words = {
-            "chaotic": f": {name}; none of the trajectories of the search was captured within"
-            f" {a['chaos_bound']} periods, and none of those followed here had settled at its end.",
-            "undamped": ". Without damping there are no attractors: this is the exponent of the"
-            " motion near this start.",
-            "undecided": f": undecided within {counted(a['max_periods'], 'period')}; no exponent"
-            " is given, since a chaotic transient has a positive one too. --max-periods raises"
-            " this bound.",
-            "failed": ": the motion leaves the range of numbers; there is no exponent.",
-        }
-        text = start + words[a["end"]]
-    if not a["lost"]:
-        return [text]
-    lost = f"{a['lost']} of {a['trajectories']} trajectories"
-    return [
-        text,
-        f"The chaos is a transient: {lost} settled. The analysis lifetime estimates its duration.",
-    ]
-
-
-def _other(a: dict[str, Any], units: Units) -> list[str]:
-    second, dimension = a["second_exponent"], a["kaplan_yorke_dimension"]
-    if second == -math.inf:
-        also = f", Kaplan-Yorke dimension {dimension:g}" if math.isfinite(dimension) else ""
-        return [f"Friction stops the motion: the second exponent is minus infinity{also}."]
-    if not math.isfinite(second):
-        return []
-    error = a["exponent_sum_stderr"]
-    total = f"{a['exponent_sum']:.6g}" + (f" +- {error:.2g}" if error else "")
-    line = f"Second exponent {second:.6g} {units.per_time}, sum of both {total}"
-    if dimension > 0:
-        line += f"; Kaplan-Yorke dimension {dimension:.4f} of the stroboscopic map's attractor"
-    return [line + "."]
+    name = str(dataset["attractor"].values[0]) if dataset.sizes["attractor"] else ""
+    how = {
+        "captured": f"{name}, reached after {counted(a['transient_periods'], 'period')}",
+        "chaotic": f"{name}; none of the trajectories of the search was captured within "
+        f"{a['chaos_bound']} periods, and none of those followed here had settled at its end",
+        "undamped": "without damping there are no attractors; motion near this start",
+        "undecided": f"undecided within {counted(a['max_periods'], 'period')}; no exponent is "
+        "given, since a chaotic transient has a positive one too. --max-periods raises this bound",
+        "failed": "the motion leaves the range of numbers; there is no exponent",
+    }
+    lines = [f"From theta = {a['theta0']:g} rad, velocity = {speed}: {how[end]}."]
+    grown = float(dataset["growth"].values[: max(a["transient_periods"], 0) + 1].max())
+    if end == "captured" and grown > _BY_ROUNDING:
+        lines.append(
+            f"On the way deviations grow by 1e{grown / math.log(10):.0f}: rounding decides when it "
+            "is reached, and which one where others coexist."
+        )
+    if a["lost"]:
+        lines.append(
+            f"The chaos is a transient: {a['lost']} of {a['trajectories']} trajectories settled. "
+            "The analysis lifetime estimates its duration."
+        )
+    if end == "captured" and math.isnan(value):
+        lines.append("Friction holds it permanently: there is no exponent.")
+    if math.isfinite(value):
+        rate = f"{with_error(value, a['largest_exponent_stderr'])} {units.per_time}"
+        whole = f"{with_error(a['per_period'], a['per_period_stderr'])} per period"
+        of = f": mean over {a['trajectories']} trajectories of {counted(a['periods'], 'period')}"
+        of += f" each, {a['dropped_periods']} more dropped before"
+        lines.append(
+            f"Largest Lyapunov exponent {rate}, {whole}{of if a['trajectories'] else ', exact'}."
+        )
+    if end == "chaotic" and value > 0:
+        doubling = math.log(2) / a["per_period"]
+        lines.append(f"A deviation doubles in {doubling:.3g} periods on average.")
+        if a["largest_exponent_stderr"] > a["precision"] * value:
+            lines.append(f"THE PRECISION {a['precision']:g} WAS NOT REACHED: raise --max-periods.")
+    if math.isfinite(value) and math.isnan(a["largest_exponent_stderr"]):
+        lines.append(
+            f"Deviations of regular motion, which grow as tau, give {a['regular']:.2g} over this "
+            "time: the exponent is not significantly different from 0."
+        )
+    elif not math.isnan(a["second_exponent"]):
+        total = with_error(a["exponent_sum"], a["exponent_sum_stderr"])
+        line = f"Second exponent {a['second_exponent']:.6g} {units.per_time}, sum of both {total}"
+        dimension = a["kaplan_yorke_dimension"]
+        lines.append(
+            line + (f"; Kaplan-Yorke dimension {dimension:.4f}." if dimension > 0 else ".")
+        )
+    return [*lines, effort(a)]

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
-from numpy.polynomial import legendre
 
 from pendmap import _core
 from pendmap.analysis import grid, result
@@ -26,37 +25,27 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats
 
 
-_PHASES, _FINE = (8, 16, 32, 64), 4096
-"""Numbers of drive phases at which the work is computed, until its Fourier series has converged to
-rounding; number of phases at which that series is evaluated."""
-
+_PHASES, _FINE = 32, 4096
+"""Numbers of drive phases at which the work is computed, enough for its harmonics up to the
+fifteenth, and at which its Fourier series is evaluated."""
 _FASTEST = 14.0
 """Largest ratio of drive frequency to the orbit's rate at upright rest: above it the work is less
 than ``exp(-pi/2 14)`` of the power, which is rounding."""
-
 _RANGE = (0.2, 4.0, 191)  # Default frequencies of the curve: first, last, number
-
 _ROUNDING = 1e-13  # Work, and torque, up to which they are taken as 0
 _LINEAR = 1e-9  # Relative deviation above which the drive's work is not proportional to p
 _RESOLVED = 1e-9  # Work over the drive's absolute power above which it is not rounding
 _REACH, _SPACING = 42.0, 0.1
 """Largest time along the separatrix, and step: the trapezoidal rule has the error
 ``exp(-pi^2/spacing)`` for analytic integrands; friction's integrand falls only as ``exp(-|t|)``."""
-_NODES = 16  # Number of Gauss nodes on a panel of the loop
-_HALVED, _WIDTH, _END = 12, 0.5, 20.0
-"""Panels of the loop's parameter: halvings toward the turning point, near which a small torque
-leaves the other upright rest; width of further panels; end, where the angle is rounding."""
+_NEAR = 1e-18  # Distance from upright rest at which the loop begins, rad
+_PANEL, _NODES = 0.5, 16  # Width of a panel of the loop's quadrature, and its Gauss nodes
 
 
 SCHEMA = Schema(
     "melnikov",
     result.UNITS,
-    Found(
-        "p_melnikov",
-        "1",
-        "threshold at the model's frequency; 0 without losses",
-        variable="own_p_melnikov",
-    ),
+    Found("p_melnikov", "1", "threshold at the model's frequency", variable="own_p_melnikov"),
     Found("p_tangency", "1", "amplitude of the tangency itself; not computed"),
     Found("p_forward", "1", "threshold on the separatrix, forward"),
     Found("p_backward", "1", "threshold on the separatrix, backward"),
@@ -88,10 +77,8 @@ def melnikov(pendulum: Pendulum | Rig, omega: ArrayLike | None = None) -> xr.Dat
 
     *A torque that keeps up a rotation*, as it gives more in a turn than the losses take, belongs to
     the pendulum without losses: in the tilted potential the orbit is the loop from upright rest
-    ``pi - asin(torque)`` into the well and back (:func:`loop`). The formula above is given too: at
-    that amplitude manifolds of neighbouring upright rests cross (heteroclinic), to first order in
-    the torque. With damping it is the limit of a small torque. The loop has no limit: its two ways
-    interfere with a phase that grows as ``omega ln(1/torque)``.
+    ``pi - asin(torque)`` into the well and back. At the amplitude of the formula above manifolds of
+    neighbouring upright rests cross then (heteroclinic), to first order in the torque.
 
     All integrals are computed from the model's own acceleration, so that effects are included. The
     true tangency differs at the second order in damping.
@@ -110,8 +97,7 @@ def melnikov(pendulum: Pendulum | Rig, omega: ArrayLike | None = None) -> xr.Dat
         torque keeps up a rotation); nan where the drive's work is not above rounding. Without
         dimensions are the values at the model's own frequency: ``p_forward``, ``p_backward``,
         ``p_loop`` (nan without a torque) and ``own_p_melnikov``, that of the loop where the torque
-        keeps up a rotation, else the lower of the others. ``p_tangency`` is nan: to be computed by
-        following manifolds.
+        keeps up a rotation, else the lower of the others. ``p_tangency`` is nan.
 
     Raises
     ------
@@ -134,28 +120,21 @@ def melnikov(pendulum: Pendulum | Rig, omega: ArrayLike | None = None) -> xr.Dat
     bare, _ = without_dimensions(pendulum)
     if bare.counts_turns:
         raise InputError(
-            "effects: an effect counts turns, so that no orbit leads from one upright position to "
-            "the next at the same energy, and Melnikov's criterion has none to follow"
+            "effects: an effect counts turns: no orbit leads from one upright position to the next"
         )
-    if omega is None:
-        omega = np.linspace(*_RANGE)
-    frequencies = grid.frequencies(omega)
+    frequencies = grid.frequencies(np.linspace(*_RANGE) if omega is None else omega)
     with core_errors():
         orbits, sense = _orbits(bare)
         at = {name: _threshold(bare, bare.omega, orbit) for name, orbit in orbits.items()}
         if not sense:
             orbits.pop("loop", None)
-        curve = [
-            [_threshold(bare, float(w), orbit) for orbit in orbits.values()] for w in frequencies
-        ]
+        every = orbits.values()
+        curve = [[_threshold(bare, float(w), orbit) for orbit in every] for w in frequencies]
     known = [at[name] for name in orbits if math.isfinite(at[name])]
     first = at["loop"] if sense else min(known, default=math.nan)
+    texts = ("1", "amplitude of the drive over gravity")
     dataset = xr.Dataset(
-        {
-            "p_melnikov": variable(
-                ("omega", "branch"), np.array(curve), "1", "amplitude of the drive over gravity"
-            )
-        },
+        {"p_melnikov": variable(("omega", "branch"), np.array(curve), *texts)},
         coords={
             "omega": variable("omega", frequencies, "1", "Omega/w0"),
             "branch": variable("branch", np.array(list(orbits)), long_name="orbit of upright rest"),
@@ -181,10 +160,8 @@ def _orbits(pendulum: Pendulum) -> tuple[dict[str, Orbit], str]:
     still = dataclasses.replace(pendulum, p=0.0)
     forward = separatrix()
     orbits = {"forward": forward, "backward": forward.mirrored()}
-    won = {
-        name: float((_power(still, orbit, np.zeros(1)) @ orbit.weight)[0])
-        for name, orbit in orbits.items()
-    }
+    once = np.zeros(1)
+    won = {name: float(_power(still, one, once)[0] @ one.weight) for name, one in orbits.items()}
     # The work of a torque is 2 pi times the torque on one branch, its negative on the other.
     torque = (won["forward"] - won["backward"]) / (4 * math.pi)
     if abs(torque) >= 1 - _ROUNDING:
@@ -195,8 +172,7 @@ def _orbits(pendulum: Pendulum) -> tuple[dict[str, Orbit], str]:
     if abs(torque) <= _ROUNDING:
         return orbits, ""
     sense = max(won, key=lambda name: won[name])
-    kept_up = won[sense] > _ROUNDING
-    return {"loop": loop(torque), **orbits}, sense if kept_up else ""
+    return {"loop": loop(torque), **orbits}, sense if won[sense] > _ROUNDING else ""
 
 
 def _power(pendulum: Pendulum, orbit: Orbit, at: Floats) -> Floats:
@@ -212,16 +188,11 @@ def _threshold(pendulum: Pendulum, omega: float, orbit: Orbit) -> float:
     still, driven, twice = (
         dataclasses.replace(pendulum, p=p, omega=omega) for p in (0.0, 1.0, 2.0)
     )
+    starts = driven.period * np.arange(_PHASES) / _PHASES
     passive = _power(still, orbit, np.zeros(1))
-    won = float((passive @ orbit.weight)[0])
-    for count in _PHASES:
-        starts = driven.period * np.arange(count) / count
-        power = _power(driven, orbit, starts) - passive
-        work = power @ orbit.weight
-        scale = float((np.abs(power) @ orbit.weight).max())
-        terms = np.abs(np.fft.rfft(work)) / count
-        if terms[-2:].max() <= _ROUNDING * scale:
-            break
+    power = _power(driven, orbit, starts) - passive
+    won, work = float((passive @ orbit.weight)[0]), power @ orbit.weight
+    scale = float((np.abs(power) @ orbit.weight).max())
     again = _power(twice, orbit, starts[:2]) @ orbit.weight - won
     if np.abs(again - 2 * work[:2]).max() > _LINEAR * scale:
         raise InputError(
@@ -249,41 +220,24 @@ def _summary(
     pendulum: Pendulum, thresholds: dict[str, float], first: float, sense: str
 ) -> list[str]:
     where = f"at omega = {pendulum.omega:g}"
-    known = {name: p for name, p in thresholds.items() if math.isfinite(p)}
-    apart = {name: p for name, p in known.items() if name != "loop"}
     lines = []
     if sense:
-        lines.append(f"The torque sustains the rotation {sense} and is included in the potential.")
+        lines.append(
+            f"The torque sustains the rotation {sense} and is included in the potential: the "
+            "threshold is that of the loop (homoclinic); on the others manifolds of neighbouring "
+            "upright rests cross (heteroclinic)."
+        )
     elif "loop" in thresholds:
         lines.append("The torque does not exceed the losses of a turn: both are perturbations.")
-    if sense and "loop" in known:
-        lines.append(
-            f"Homoclinic tangles on the loop of upright rest from p = {first:.9g} on, {where} "
-            "(Melnikov, first order)."
-        )
-    if sense and apart:
-        text = ", ".join(f"{name} from p = {p:.9g}" for name, p in apart.items())
-        lines.append(
-            f"Manifolds of neighbouring upright rests cross {text} on (heteroclinic, the torque "
-            "too to first order)."
-        )
-    elif len(apart) > 1 and np.ptp(list(apart.values())) <= _LINEAR * first:
-        lines.append(
-            f"Homoclinic tangles from p = {first:.9g} on, {where} (Melnikov, first order)."
-        )
-    else:
-        lines += [
-            f"Homoclinic tangles {name} from p = {p:.9g} on, {where} (Melnikov, first order)."
-            for name, p in apart.items()
-        ]
-    if not sense and "loop" in known:
-        lines.append(
-            "On the homoclinic loop of upright rest under the torque they begin at p = "
-            f"{known['loop']:.9g}."
-        )
-    if hidden := [name for name in thresholds if name not in known]:
-        names = " and ".join(hidden)
-        lines.append(f"No threshold {where} ({names}): the drive's work is below rounding errors.")
+    names: dict[str, list[str]] = {}
+    for name, p in thresholds.items():
+        names.setdefault(f"{p:.9g}" if math.isfinite(p) else "", []).append(name)
+    for text, alike in names.items():
+        what = f"{where} ({' and '.join(alike)})"
+        if text:
+            lines.append(f"Manifolds cross from p = {text} on, {what}: Melnikov, first order.")
+        else:
+            lines.append(f"No threshold {what}: the drive's work is below rounding errors.")
     if thresholds.get("loop", first) == 0:
         return [*lines, "Without damping there are no attractors and no basins."]
     if first > 0 and pendulum.p:
@@ -305,9 +259,7 @@ class Orbit:
     speed: Floats
     weight: Floats
     torque: float = 0.0
-    """Torque in the equation that the orbit solves."""
-    rate: float = 1.0
-    """Growth rate of deviations from upright rest."""
+    rate: float = 1.0  # of growth of deviations from upright rest
 
     def mirrored(self) -> Orbit:
         """Return the image under ``th -> -th``, an orbit of the opposite torque."""
@@ -323,65 +275,45 @@ def separatrix() -> Orbit:
 def loop(torque: float) -> Orbit:
     """Return the orbit that leaves upright rest ``pi - asin(torque)`` and comes back to it.
 
-    At a distance ``u`` from there ``th'^2 / 2 = G(u) = c (1 - cos u) - torque (u - sin u)``, ``c =
-    sqrt(1 - torque^2)``, up to its zero ``u_t``, where the orbit turns. With ``u = u_t /
-    cosh(y)^2`` time is ``dt / dy = 2 / sqrt(2 h)``, ``h = G / (u tanh y)^2``, which is smooth and
-    positive from the turning point, ``y = 0``, on to upright rest.
+    The distance ``u`` from there grows from a tiny one, ``u'' = c sin u - torque (1 - cos u)``,
+    ``c = sqrt(1 - torque^2)``, until the orbit turns; the way back is the mirror image in time.
     """
+    from scipy.integrate import solve_ivp  # noqa: PLC0415 (heavy; only a torque needs it)
+
     if torque < 0:
         return loop(-torque).mirrored()
     c = math.sqrt((1 - torque) * (1 + torque))
-    turn = _turning_point(torque, c)
-    ends = np.concatenate(
-        [[0.0], 0.5 ** np.arange(_HALVED, 1, -1), np.arange(_WIDTH, _END + _WIDTH / 2, _WIDTH)]
+    rate = math.sqrt(c)
+
+    def slope(_: float, state: Floats) -> list[float]:
+        return [state[1], c * math.sin(state[0]) - 2 * torque * math.sin(state[0] / 2) ** 2]
+
+    def turns(_: float, state: Floats) -> float:
+        return float(state[1])
+
+    turns.terminal, turns.direction = True, -1  # type: ignore[attr-defined]
+    run = solve_ivp(
+        slope,
+        (0.0, 1e3 / rate),
+        [_NEAR, rate * _NEAR],
+        "DOP853",
+        dense_output=True,
+        events=turns,
+        rtol=1e-13,
+        atol=1e-30,
+        max_step=_SPACING / rate,
     )
-    x, weight = legendre.leggauss(_NODES)
-    half = np.diff(ends)[:, None] / 2
-    y = ends[:-1, None] + half * (1 + x)
-    u, beyond = turn / np.cosh(y) ** 2, turn * np.tanh(y) ** 2
-    # G is expanded about its nearer zero, u = 0 or the turning point.
-    middle = turn - beyond / 2
-    from_rest = 2 * c * np.sin(u / 2) ** 2 - torque * _less_sine(u)
-    from_turn = torque * (
-        2 * _less_sine(beyond / 2) + 4 * np.sin(beyond / 2) * np.sin(middle / 2) ** 2
-    ) - 2 * c * np.sin(beyond / 2) * np.sin(middle)
-    energy = np.where(u < beyond, from_rest, from_turn)
-    rate = 2 * u * np.tanh(y) / np.sqrt(2 * energy)
-    whole = (half * rate) @ weight
-    time = (np.cumsum(whole) - whole)[:, None] + half * rate @ _integrals(x).T
-    time, theta = time.ravel(), (math.atan2(torque, -c) - u).ravel()
-    speed, weights = np.sqrt(2 * energy).ravel(), (half * rate * weight).ravel()
+    x, weight = np.polynomial.legendre.leggauss(_NODES)
+    half = _PANEL / rate / 2
+    ends = -np.arange(2 * half, run.t[-1], 2 * half)[::-1]
+    time = (ends[:, None] + half * (1 + x)).ravel()  # before the turn
+    u, speed = run.sol(run.t[-1] + time)
+    theta = math.atan2(torque, -c) - u
     return Orbit(
-        np.concatenate([-time, time]),
+        np.concatenate([time, -time]),
         np.tile(theta, 2),
         np.concatenate([-speed, speed]),
-        np.tile(weights, 2),
+        np.tile(half * weight, 2 * ends.size),
         torque,
-        math.sqrt(c),
+        rate,
     )
-
-
-def _turning_point(torque: float, c: float) -> float:
-    """Return the distance from upright rest at which the loop turns."""
-    from scipy.optimize import brentq  # noqa: PLC0415 (heavy; only a torque needs it)
-
-    def energy(u: float) -> float:
-        return 2 * c * math.sin(u / 2) ** 2 - torque * float(_less_sine(np.array(u)))
-
-    # Beyond the bottom of the well, where G is greatest, it falls.
-    return float(brentq(energy, 2 * math.atan2(c, torque), math.tau, xtol=1e-300))
-
-
-def _less_sine(x: Floats) -> Floats:
-    """Return ``x - sin x`` without loss of digits where ``x`` is small."""
-    square = x * x
-    series = x * square / 6 * (1 - square / 20 * (1 - square / 42 * (1 - square / 72)))
-    return np.where(x < 0.1, series, x - np.sin(x))  # noqa: PLR2004 (the series errs by 1e-15)
-
-
-def _integrals(x: Floats) -> Floats:
-    """Return the matrix from values at Gauss nodes to integrals from -1 to each node."""
-    p = legendre.legvander(x, x.size)
-    k = np.arange(1, x.size)
-    of_each = np.concatenate([p[:, :1] + p[:, 1:2], (p[:, 2:] - p[:, :-2]) / (2 * k + 1)], axis=1)
-    return np.asarray(of_each @ np.linalg.inv(p[:, :-1]))

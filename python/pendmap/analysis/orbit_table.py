@@ -97,23 +97,10 @@ def chaotic(dataset: xr.Dataset) -> Mask:
 
 def objects(dataset: xr.Dataset, one: str, *more: str) -> list[dict[str, Any]]:
     """Return the orbits of a :func:`table` over ``one`` for JSON, with ``more`` variables."""
-    orbits = records(
-        dataset,
-        id="id",
-        name=one,
-        kind="kind",
-        n="n",
-        w="w",
-        theta="theta_point",
-        velocity="velocity_point",
-        points="id",  # replaced below
-        multipliers="multipliers",
-        exponent="exponent",
-        exponent_stderr="exponent_stderr",
-        period="period",
-        twin="twin",
-        **{name: name for name in more if name in dataset},  # files of earlier versions lack some
-    )
+    columns = {"id": "id", "name": one, "kind": "kind", "n": "n", "w": "w"}
+    columns |= {"theta": "theta_point", "velocity": "velocity_point", "points": "id"}
+    alike = ("multipliers", "exponent", "exponent_stderr", "period", "twin", *more)
+    orbits = records(dataset, **columns, **{name: name for name in alike})
     for orbit, points in zip(orbits, points_of(dataset, one), strict=True):
         orbit["points"] = points.tolist()
         if orbit["n"] <= 0:  # chaos
@@ -153,15 +140,6 @@ def matched(
             taken[1].add(m)
             pairs.append((True, far, k, m))
     return pairs
-
-
-def named_alike(
-    names: list[str], points: list[Floats], others: list[str], theirs: list[Floats]
-) -> list[int]:
-    """Match attractors of equal plain names by least distance; return indices, else -1."""
-    pairs = matched(points, theirs, lambda k, m: math.inf if names[k] == others[m] else 0.0)
-    place = {m: k for _, _, k, m in pairs}
-    return [place.get(m, -1) for m in range(len(others))]
 
 
 def _apart(one: Floats, other: Floats, *, circle: bool) -> float:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import partial
 from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
@@ -11,21 +10,19 @@ import xarray as xr
 
 from pendmap import _core
 from pendmap.analysis import result
-from pendmap.analysis.draws import drawn, drawn_field, interval
 from pendmap.analysis.grid import Axis, Grid
 from pendmap.analysis.numerics import Numerics
-from pendmap.analysis.orbit_table import attractors_of, named_alike, objects, points_of, table
-from pendmap.analysis.result import Field, Schema, records, summarised
+from pendmap.analysis.orbit_table import objects, table
+from pendmap.analysis.result import Field, Schema, rows, summarised
 from pendmap.analysis.run import RunOptions
 from pendmap.errors import MOST_CELLS, check_type, check_whole, core_errors
 from pendmap.files import facts
 from pendmap.files.variables import flag, variable
-from pendmap.formatting import counted, with_error
+from pendmap.formatting import counted
 from pendmap.model import without_dimensions
 from pendmap.units import VELOCITY, Units
 
 if TYPE_CHECKING:
-    from pendmap.analysis.draws import Analysis, Draws
     from pendmap.analysis.run import Keywords
     from pendmap.model import Pendulum, Rig
 
@@ -39,16 +36,8 @@ _LISTED = 12  # Largest number of orbits in a summary
 
 def _orbits(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the orbits for the JSON object."""
-    entries = objects(dataset, "orbit", "stable", "residual")
+    entries = objects(dataset, "orbit", "stable")
     return [entry | {"stable": bool(entry["stable"])} for entry in entries]
-
-
-@drawn_field
-def drawn_orbits(dataset: xr.Dataset) -> dict[str, Any]:
-    """Return the draws of closed orbits for the JSON object."""
-    spreads = {key: key for key in ("theta_spread", "velocity_spread", "multipliers_spread")}
-    orbits = records(dataset, name="orbit", exists="exists", stable="stable_share", **spreads)
-    return {"orbits": orbits, "others": facts(dataset)["drawn_others"]}
 
 
 SCHEMA = Schema(
@@ -61,7 +50,6 @@ SCHEMA = Schema(
     Field("begun", "1", "places from which Newton's method began"),
     *result.TIMED,
     *result.END,
-    drawn_orbits,
     result.SECTION,
     *result.BOX,
     *result.VERSIONS,
@@ -82,13 +70,12 @@ def window(pendulum: Pendulum | Rig, n: int, w: int) -> Grid:
     return Grid(Axis(-math.pi, math.pi, cells), Axis(-reach, reach, cells))
 
 
-def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
+def orbit(
     pendulum: Pendulum | Rig,
     n: int = 1,
     w: int = 0,
     grid: Grid | None = None,
     *,
-    draws: int | None = None,
     run: RunOptions | None = None,
     **options: Unpack[Keywords],
 ) -> xr.Dataset:
@@ -97,10 +84,9 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
     An orbit is a fixed point of ``P^n(x) - (2 pi w, 0)``, ``P`` the stroboscopic map. The
     displacement is compared with its linear part on every cell of the grid; cells in which it
     cannot vanish are discarded, the others quartered, four times. Newton's method begins in those
-    that remain, first by differences, then on the precise map, and beside orbits near their birth
-    with the known ones divided out. Orbits that close to 1e-12, or to rounding where the
-    multipliers are large, are kept, with the Floquet multipliers, the eigenvalues of the derivative
-    of ``P^n``, also where friction stops the pendulum on its way. An orbit whose neighbours in the
+    that remain, and beside orbits near their birth with the known ones divided out. Orbits that
+    close to 1e-12, or to rounding where the multipliers are large, are kept, with the Floquet
+    multipliers, the eigenvalues of the derivative of ``P^n``. An orbit whose neighbours in the
     plane lie nearer than a cell may be missed; a finer grid finds it. Rest states that friction
     holds form a continuum and are not listed.
 
@@ -116,9 +102,6 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
         Net turns over that period, forward positive.
     grid : Grid, optional
         The box in which an orbit must have a point, and its cells; by default :func:`window`.
-    draws : int, optional
-        As for :func:`pendmap.basins`; adds how far orbits move, and in how many draws they exist
-        and are stable.
     run : RunOptions, optional
         As for :func:`pendmap.basins`.
 
@@ -127,7 +110,7 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
     xarray.Dataset
         The table of orbits over ``orbit``: ``kind``, ``n``, ``w``, ``theta_point`` and
         ``velocity_point`` (the point with the lowest angle), ``multipliers``, ``stable``,
-        ``exponent``, ``period``, ``twin``, ``residual``; all points over ``point``; the motion,
+        ``exponent``, ``period``, ``twin``; all points over ``point``; the motion,
         piece by piece of a period, over ``sample``.
 
     Raises
@@ -149,31 +132,18 @@ def orbit(  # noqa: PLR0913 (physics first, numerical choices by name)
     numerics = Numerics(run)
     grid = window(pendulum, n, w) if grid is None else grid
     check_type("grid", grid, Grid, "Grid.square(200)")
-    if draws is not None:
-        several = drawn(pendulum, draws, run)
-        same = partial(orbit, n=n, w=w, grid=grid)
-        return orbits_over(same(pendulum, run=several.first), several, same)
     with core_errors():
         box = grid.bare(units)
         raw = _core.orbits(bare, (n, w), *box, run.workers, run.progress)
         paths = _paths(bare, raw.orbits, units)
-    orbits = raw.orbits
-    residual = np.array([o.residual for o in orbits], dtype=float)
     dataset = xr.Dataset(
         {
-            **table(orbits, units, "orbit"),
-            "stable": flag("orbit", [o.stable for o in orbits], "whether it is stable"),
-            "residual": variable("orbit", residual, "1", "distance that remains after a period"),
+            **table(raw.orbits, units, "orbit"),
+            "stable": flag("orbit", [o.stable for o in raw.orbits], "whether it is stable"),
             **paths,
         }
     )
-    values = {
-        **numerics.provenance(),
-        **grid.attributes,
-        "n": n,
-        "w": w,
-        "cells": grid.cells,
-    }
+    values = {**numerics.provenance(), **grid.attributes, "n": n, "w": w, "cells": grid.cells}
     SCHEMA.complete(dataset, pendulum, values, raw)
     summarised(dataset, _summary(dataset, bare, friction=raw.friction), pendulum, "orbits are")
     return dataset
@@ -203,34 +173,27 @@ def _paths(pendulum: Pendulum, orbits: list[_core.Orbit], units: Units) -> dict[
 
 
 def _summary(dataset: xr.Dataset, pendulum: Pendulum, *, friction: bool) -> list[str]:
-    a = facts(dataset)
+    a, count = facts(dataset), dataset.sizes["orbit"]
     units = Units.of(a)
-    stable = int(dataset["stable"].sum())
-    count = dataset.sizes["orbit"]
-    sought = f"period {a['n']} and {counted(abs(a['w']), 'net turn')}"
-    sought += f" {'forward' if a['w'] > 0 else 'backward'}" if a["w"] else ""
-    lines = [f"{counted(count, 'orbit') if count else 'No orbit'} of {sought}, {stable} stable."]
-    for k in range(min(count, _LISTED)):
-        row = dataset.isel(orbit=k)
-        pairs = [complex(*pair) for pair in row["multipliers"].values if pair[0] == pair[0]]
-        multipliers = ", ".join(_written(value) for value in pairs)
-        speed = units.spoken(format(float(row["velocity_point"]), ".9g"))
-        period = ""
-        if pendulum.p == 0 and a["w"]:
-            period = f", period {units.seconds(format(float(row['period']), '.9g'))}"
+    which = f"period {a['n']} and {counted(abs(a['w']), 'net turn')}"
+    which += f" {'forward' if a['w'] > 0 else 'backward'}" if a["w"] else ""
+    number = counted(count, "orbit") if count else "No orbit"
+    lines = [f"{number} of {which}, {int(dataset['stable'].sum())} stable."]
+    names = ("orbit", "stable", "theta_point", "velocity_point", "multipliers", "period")
+    for name, stable, theta, velocity, pairs, period in list(rows(dataset, *names))[:_LISTED]:
+        values = [complex(*pair) for pair in pairs if math.isfinite(pair[0])]
+        texts = ", ".join(f"{v:.6g}" if v.imag else f"{v.real:.6g}" for v in values)
+        of_own = f", period {units.seconds(f'{period:.9g}')}" if pendulum.p == 0 and a["w"] else ""
         lines.append(
-            f"{row['orbit'].values}: {'stable' if int(row['stable']) else 'unstable'}, "
-            f"theta = {float(row['theta_point']):.9g} rad, velocity = {speed}, "
-            f"{'multipliers' if len(pairs) > 1 else 'multiplier'} {multipliers}{period}."
+            f"{name}: {'stable' if stable else 'unstable'}, theta = {theta:.9g} rad, velocity = "
+            f"{units.spoken(f'{velocity:.9g}')}, multipliers {texts}{of_own}."
         )
     if count > _LISTED:
         lines.append(f"{count - _LISTED} more are in the result.")
-    if pendulum.p == 0 and a["n"] > 1:
-        lines.append("Without drive every orbit closes after one period: n must be 1.")
-    if pendulum.p == 0 and pendulum.gamma == 0 and a["w"]:
+    if pendulum.p == 0 and (a["n"] > 1 or (pendulum.gamma == 0 and a["w"])):
         lines.append(
-            "Without drive and damping rotations form continuous families, of any period: "
-            "Newton's method finds only isolated orbits."
+            "Without drive every orbit closes after one period (n = 1); without damping too "
+            "rotations are not isolated, and Newton's method finds none."
         )
     if friction:
         lines.append("Rest states held by friction form a continuum and are not listed.")
@@ -241,80 +204,4 @@ def _summary(dataset: xr.Dataset, pendulum: Pendulum, *, friction: bool) -> list
         f"{counted(a['begun'], 'place')}, {a['seconds']:.2f} s on "
         f"{counted(a['threads'], 'thread')}."
     )
-    return lines
-
-
-def _written(value: complex) -> str:
-    if value.imag == 0:
-        return f"{value.real:.6g}"
-    return f"{value.real:.6g} {'+' if value.imag > 0 else '-'} {abs(value.imag):.6g} i"
-
-
-def orbits_over(dataset: xr.Dataset, draws: Draws, analysis: Analysis) -> xr.Dataset:
-    """Return K closed orbits with statistics of the orbits of D draws.
-
-    Orbits are matched by name, and among those of one name by their points. Of each the point and
-    the multipliers nearest to those of the model's orbit are taken. Adds ``drawn_theta``,
-    ``drawn_velocity`` (K, D) and ``drawn_multipliers`` (K, eigenvalue, part, D), nan where a draw
-    has no such orbit; ``theta_spread``, ``velocity_spread`` and ``multipliers_spread``, their
-    standard deviations over the draws; ``exists`` and ``stable_share``, the shares of the draws in
-    which it exists, and exists and is stable; ``drawn`` (D, parameter); ``drawn_others``, the mean
-    number of orbits of a draw that the model itself lacks.
-    """
-    names, points = [one.plain for one in attractors_of(dataset)], points_of(dataset, "orbit")
-    count, total = len(names), len(draws)
-    state = np.full((count, 2, total), np.nan)
-    multipliers = np.full((*dataset["multipliers"].shape, total), np.nan)
-    there, stable = np.zeros((count, total), bool), np.zeros((count, total), bool)
-    others = 0
-    for d, one in enumerate(draws.each(analysis)):
-        theirs = points_of(one, "orbit")
-        alike = [orbit.plain for orbit in attractors_of(one)]
-        for j, k in enumerate(named_alike(names, points, alike, theirs)):
-            if k < 0:
-                others += 1
-                continue
-            there[k, d], stable[k, d] = True, bool(one["stable"][j])
-            point = np.array([dataset["theta_point"][k], dataset["velocity_point"][k]])
-            away = theirs[j] - point
-            away[:, 0] = np.remainder(away[:, 0] + math.pi, math.tau) - math.pi
-            state[k, :, d] = point + away[np.argmin(np.hypot(*away.T))]
-            of_model, pair = dataset["multipliers"].values[k], one["multipliers"].values[j]
-            swapped = np.abs(pair[::-1] - of_model).sum() < np.abs(pair - of_model).sum()
-            multipliers[k, ..., d] = pair[::-1] if swapped else pair
-    spread = interval(state)[1]
-    dims, speed = dataset["multipliers"].dims, dataset["velocity_point"].attrs["units"]
-    single, per_draw, part = "orbit", ("orbit", "draw"), dataset["multipliers"].attrs["long_name"]
-    of = "standard deviation over the draws of"
-    with_draws = dataset.assign(
-        **result.point(per_draw, state[:, 0], state[:, 1], speed, "drawn_{}"),
-        drawn_multipliers=variable((*dims, "draw"), multipliers, "1", part),
-        theta_spread=variable(single, spread[:, 0], "rad", f"{of} the angle"),
-        velocity_spread=variable(single, spread[:, 1], speed, f"{of} the velocity"),
-        multipliers_spread=variable(dims, interval(multipliers)[1], "1", f"{of} a {part}"),
-        exists=variable(single, there.mean(axis=1), "1", "share of the draws that have the orbit"),
-        stable_share=variable(single, stable.mean(axis=1), "1", "share in which it is stable"),
-        drawn_others=variable((), others / total, "1", "orbits of a draw that the model lacks"),
-    )
-    return draws.complete(with_draws, _drawn_summary(with_draws, others))
-
-
-def _drawn_summary(dataset: xr.Dataset, others: int) -> list[str]:
-    lines = []
-    for k, name in enumerate(dataset["orbit"].values):
-        theta, velocity = (
-            with_error(float(dataset[f"{what}_point"][k]), float(dataset[f"{what}_spread"][k]))
-            for what in ("theta", "velocity")
-        )
-        sizes = np.hypot(*np.moveaxis(dataset["drawn_multipliers"].values[k], 1, 0))
-        mean, error, _, _ = interval(sizes.max(axis=0))
-        largest = f", largest multiplier {with_error(float(mean), float(error))} in size"
-        lines.append(
-            f"{name}: there in {100 * float(dataset['exists'][k]):.3g} % of the draws, stable in "
-            f"{100 * float(dataset['stable_share'][k]):.3g} %; theta = {theta}, "
-            f"velocity = {velocity}{largest if math.isfinite(mean) else ''}."
-        )
-    if others:
-        more = counted(others, "orbit")
-        lines.append(f"All draws together have {more} more, which the own model has not.")
     return lines

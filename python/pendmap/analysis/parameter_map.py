@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from pendmap.analysis import along, cell_search, result, varied
-from pendmap.analysis.draws import drawn, drawn_field, outcomes, sure_line
+from pendmap.analysis.draws import drawn, drawn_field, outcome_lines, outcomes
 from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.orbit_table import attractors_of
 from pendmap.analysis.result import Field, Schema, rows, summarised
@@ -40,9 +40,8 @@ if TYPE_CHECKING:
 
 
 _LISTED = 10  # Largest number of regimes in a summary
-_SHARES = ("share_mean", "share_low", "share_high")  # Variables over the outcomes
 _PLACES = 3  # Largest number of groups of cells with undecided starts in a summary
-_FREQUENCIES = 81  # Number of frequencies of the critical curves over a map, before refinement
+_FREQUENCIES = 201  # Number of frequencies of the critical curves over a map, besides turns
 
 
 def _regimes(dataset: xr.Dataset) -> list[dict[str, Any]]:
@@ -68,17 +67,10 @@ def having(dim: str, sets: Iterable[Collection[str]], kinds: Iterable[str]) -> t
 @drawn_field
 def drawn_regimes(dataset: xr.Dataset) -> dict[str, Any]:
     """Return the draws of a map over two parameters for the JSON object."""
-    regimes = [
-        {"kinds": kinds, "share": mean, "ci95": [low, high]}
-        for kinds, (mean, low, high) in _outcomes(dataset)
-    ]
-    return {"regimes": regimes, "sure_cells": facts(dataset)["sure_cells"]}
-
-
-def _outcomes(dataset: xr.Dataset) -> Iterator[tuple[list[str], tuple[Any, ...]]]:
-    """Return the kinds of each outcome of the draws, and its shares."""
-    every = sets(dataset, "outcome_has", "outcome_kind")
-    return zip(every, rows(dataset, *_SHARES), strict=True)
+    shares = rows(dataset, "share_mean", "share_low", "share_high")
+    both = zip(sets(dataset, "outcome_has", "outcome_kind"), shares, strict=True)
+    regimes = [{"kinds": k, "share": mean, "ci95": [low, high]} for k, (mean, low, high) in both]
+    return {"regimes": regimes, "sure_cells": float(dataset["sure_cells"])}
 
 
 SCHEMA = Schema(
@@ -302,7 +294,7 @@ def _curves(
     p_max = float(p.bare[-1] + (np.diff(p.bare)[0] / 2 if p.bare.size > 1 else 0.0))
     frequency = np.linspace(max(low, omega.bare[0] / 2), high, _FREQUENCIES)
     curves = tongues(model, frequency, p_max, inverted=False, refine=True, run=run)
-    scale, sought = omega.values[-1] / omega.bare[-1], curves["fold_sought"]
+    scale, sought = omega.values[-1] / omega.bare[-1], curves["asked"]
     return {
         "curve_omega": ("curve_frequency", scale * curves["omega"].values, omega.attributes),
         "curve_fold": ("curve_frequency", curves["fold"].values, p.attributes),
@@ -359,44 +351,21 @@ def _summary(dataset: xr.Dataset) -> list[str]:
 def regimes_over(dataset: xr.Dataset, draws: Draws, analysis: Analysis) -> xr.Dataset:
     """Return a map of M x N cells with the regimes of D draws of the other parameters.
 
-    Adds, over ``outcome``, all regimes: ``outcome_has`` (as ``regime_has``), ``probability``
-    (outcome, M, N), ``drawn_share`` (outcome, D), ``share_mean``, ``share_low`` and ``share_high``
-    (the 95 % interval over the draws); over the cells ``certainty``, the probability of the most
-    likely regime; ``drawn`` (D, parameter); ``sure_cells``: the share of the cells with a certainty
-    of 95 % or more.
+    Adds ``outcome_has`` (as ``regime_has``), the variables of ``draws.outcomes`` over ``outcome``,
+    all regimes, and over the cells, and ``drawn`` (D, parameter).
     """
-    dims, shape = dataset["regime"].dims, dataset["regime"].shape
-    counts: dict[tuple[str, ...], np.ndarray] = {}
-    shares: list[dict[tuple[str, ...], float]] = []
     ranks: dict[str, tuple[int, ...]] = {}
-    for one in draws.each(analysis):
-        ranks |= {kind.pair: kind.rank for kind in attractors_of(one, "kind_")}
-        regimes = [tuple(kinds) for kinds in sets(one)]
-        shares.append(dict(zip(regimes, one["regime_share"].values.tolist(), strict=True)))
-        for k, kinds in enumerate(regimes):
-            counts.setdefault(kinds, np.zeros(shape, np.uint16))[one["regime"].values == k] += 1
-    share = np.array([[one.get(kinds, 0.0) for one in shares] for kinds in counts])
-    order = np.argsort(-share.mean(axis=1), kind="stable")
-    every = sorted(set().union(*counts) - {cell_search.UNDECIDED}, key=ranks.__getitem__)
-    ranked = [list(counts)[k] for k in order]
-    probability = np.stack(list(counts.values()))[order].astype(np.float32) / len(draws)
-    with_draws = dataset.assign(outcome_has=having("outcome", ranked, every))
-    names = np.array(every, dtype=str)
-    with_draws = with_draws.assign_coords(
-        outcome_kind=variable("outcome_kind", names, long_name="kind of attractor")
-    )
-    with_draws = with_draws.assign(outcomes(dims, probability, share[order]))
-    return draws.complete(with_draws, _drawn_summary(with_draws))
 
+    def cells() -> Iterator[tuple[NDArray[Any], dict[int, tuple[str, ...]]]]:
+        for one in draws.results(analysis):
+            ranks.update((kind.pair, kind.rank) for kind in attractors_of(one, "kind_"))
+            yield one["regime"].values, dict(enumerate(map(tuple, sets(one))))
 
-def _drawn_summary(dataset: xr.Dataset) -> list[str]:
-    lines = []
-    every = list(_outcomes(dataset))
-    for kinds, (mean, low, high) in every[:_LISTED]:
-        lines.append(
-            f"{', '.join(kinds)}: {100 * mean:.3g} % of the cells, 95 % of the draws in "
-            f"[{100 * low:.3g}, {100 * high:.3g}] %."
-        )
-    if len(every) > _LISTED:
-        lines.append(f"{len(every) - _LISTED} more regimes are in the result.")
-    return [*lines, sure_line(dataset, "a regime")]
+    regimes, over = outcomes(dataset["regime"].dims, cells())
+    order = np.argsort(-over["share_mean"].values, kind="stable")
+    over, regimes = over.isel(outcome=order), [regimes[k] for k in order]
+    kinds = sorted(set().union(*regimes) - {cell_search.UNDECIDED}, key=ranks.__getitem__)
+    names = variable("outcome_kind", np.array(kinds, dtype=str), long_name="kind of attractor")
+    over = over.assign(outcome_has=having("outcome", regimes, kinds), outcome_kind=names)
+    lines = outcome_lines(over, [", ".join(one) for one in regimes], "cells", _LISTED)
+    return draws.complete(dataset.assign(over), lines)

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     import xarray as xr
-    from numpy.typing import NDArray
 
     from pendmap.model import Pendulum
 
@@ -27,14 +26,10 @@ if TYPE_CHECKING:
 Times = npt.NDArray[np.int64]
 
 LEAST: Final = 100  # Smallest number of captures in a tail
-
-LEVEL: Final = 0.05  # Level of the tests of a tail: a lower p-value rejects the exponential
-
+LEVEL: Final = 0.05  # Level of the test of a tail: a lower p-value rejects the exponential
 _BINS: Final = 8  # Intervals of the tail, of equal expected captures, whose rates are compared
-
 _GROWTH: Final = 1.1  # Ratio of successive beginnings of the tail that are tested
-
-_AGREEING: Final = 3  # Number of successive beginnings that must pass the tests
+_AGREEING: Final = 3  # Number of successive beginnings that must pass the test
 _FOLLOWED: Final = 400  # Largest number of trajectories along which deviations are followed
 _LONGEST: Final = 400  # Largest number of periods of these trajectories
 _LEAST_FOLLOWED: Final = 20  # Smallest number of trajectories for an estimate of growth
@@ -54,15 +49,13 @@ class Tail:
     """Standard error ``mean / sqrt(captured)``, in periods."""
     captured: int
     censored: int
-    weibull: float
-    """p-value of an exponential tail in the score test of a Weibull distribution's shape."""
-    steady: float
+    chance: float
     """p-value of an exponential tail in a chi-squared test of the rates in eight intervals."""
 
     @property
     def is_exponential(self) -> bool:
-        """Whether neither test rejects the exponential."""
-        return min(self.weibull, self.steady) > LEVEL
+        """Whether the test does not reject the exponential."""
+        return self.chance > LEVEL
 
 
 def tail(times: Times, censored: int, bound: int, start: int) -> Tail:
@@ -75,28 +68,24 @@ def tail(times: Times, censored: int, bound: int, start: int) -> Tail:
     count, left = lives.size, bound - start
     total = float(lives.sum()) + censored * left
     if count == 0:
-        return Tail(start, math.inf, math.inf, 0, censored, math.nan, math.nan)
+        return Tail(start, math.inf, math.inf, 0, censored, math.nan)
     mean = total / count
-    return Tail(
-        start,
-        mean,
-        mean / math.sqrt(count),
-        count,
-        censored,
-        _weibull(lives, censored, left),
-        _steady(lives, censored, left, count / total),
-    )
+    chance = _steady(lives, censored, left, count / total)
+    return Tail(start, mean, mean / math.sqrt(count), count, censored, chance)
 
 
-def begin(times: Times, censored: int, bound: int) -> Tail | None:
-    """Return the exponential tail, or None if there is none.
+def begin(times: Times, censored: int, bound: int, start: int | None = None) -> Tail | None:
+    """Return the tail from ``start``, by default where it is exponential; None if there is none.
 
-    It begins at twice the earliest period from which three successive beginnings pass the tests:
+    It begins at twice the earliest period from which three successive beginnings pass the test:
     at that period itself noise may hide a remaining transient, which would bias the mean.
     """
+    if start is not None:
+        given = tail(times, censored, bound, start)
+        return given if given.captured else None
     row: list[Tail] = []
-    for start in _beginnings(times):
-        now = tail(times, censored, bound, start)
+    for period in _beginnings(times):
+        now = tail(times, censored, bound, period)
         if now.captured < LEAST:
             return None
         row = [*row, now] if now.is_exponential else []
@@ -119,20 +108,6 @@ def _beginnings(times: Times) -> Iterator[int]:
         start = max(start + 1, round(start * _GROWTH))
 
 
-def _weibull(lives: Times, censored: int, left: int) -> float:
-    """Return the p-value of ``k = 1`` in the score test of the shape k in ``exp(-(x/a)^k)``."""
-    x = lives - 0.5  # times are rounded up to whole periods: half a period too long on average
-    logs = np.log(x)
-    end, log_end = float(left), math.log(max(left, 1))
-    count = x.size
-    first = float((x * logs).sum()) + censored * end * log_end
-    second = float((x * logs**2).sum()) + censored * end * log_end**2
-    rate = count / (float(x.sum()) + censored * end)
-    score = count + float(logs.sum()) - rate * first
-    variance = count + rate * second - (rate * first) ** 2 / count
-    return math.erfc(abs(score) / math.sqrt(2 * variance)) if variance > 0 else 0.0
-
-
 def _steady(lives: Times, censored: int, left: int, rate: float) -> float:
     """Return the p-value of equal rates in the intervals of the tail, by chi squared."""
     from scipy.special import chdtrc  # noqa: PLC0415 (scipy takes a while)
@@ -152,31 +127,33 @@ def _steady(lives: Times, censored: int, left: int, rate: float) -> float:
 
 
 def growth_on_saddle(
-    basin_map: xr.Dataset,
-    fitted: Tail | None,
-    pendulum: Pendulum,
-    threads: int,
-) -> tuple[float, float, int]:
-    """Return exponent per period of starts before capture, its standard error, their number."""
-    none = math.nan, math.nan, 0
+    basin_map: xr.Dataset, fitted: Tail | None, pendulum: Pendulum, threads: int
+) -> tuple[float, float]:
+    """Return the exponent per period of starts before their capture, and its standard error.
+
+    Long-lived trajectories sample the natural measure of the saddle.
+    """
     if fitted is None:
-        return none
+        return math.nan, math.nan
     units = Units.of(facts(basin_map))
-    settle, label = basin_map["settle_periods"].values, basin_map["label"].values
+    label, settle = (basin_map[n].values.astype(np.int64) for n in ("label", "settle_periods"))
+    # Periods in which each start approaches its attractor are not on the saddle.
+    rate = -units.bare(basin_map["exponent"].values, RATE) * pendulum.period
+    rate = np.where(np.isfinite(rate) & (rate > 0), rate, _SETTLING / _LEAST_SETTLING)
+    approach = np.clip(np.ceil(_SETTLING / rate), _LEAST_SETTLING, _MOST_SETTLING)
+    of_start = np.maximum(label, 0)
     end = np.where(settle >= 0, settle, basin_map.attrs["max_periods"])
-    end = end - _settling(basin_map, pendulum.period)
-    never = (label < 0) | np.concatenate([[False], chaotic(basin_map)])[np.maximum(label, 0)]
-    # Long-lived trajectories sample the natural measure of the saddle.
+    end = end - np.concatenate([[0], approach]).astype(np.int64)[of_start]
+    never = (label < 0) | np.concatenate([[False], chaotic(basin_map)])[of_start]
     least = _ALIGNED + max(math.ceil(fitted.mean / 2), 10)
     chosen = np.flatnonzero((end >= min(least, _LONGEST // 2)) & ~never)[:_FOLLOWED]
     if chosen.size < _LEAST_FOLLOWED:
-        return none
+        return math.nan, math.nan
     end = np.minimum(end[chosen], _LONGEST)
-    speeds = units.bare(basin_map["start_velocity"].values[chosen], VELOCITY)
     growth = _core.growth(
         pendulum,
         basin_map["start_theta"].values[chosen].copy(),
-        np.ascontiguousarray(speeds),
+        np.ascontiguousarray(units.bare(basin_map["start_velocity"].values[chosen], VELOCITY)),
         int(end.max()),
         1,
         int(basin_map.attrs["steps_per_period"]),
@@ -184,19 +161,8 @@ def growth_on_saddle(
     )
     periods = np.arange(growth.shape[1])
     mine = (periods >= _ALIGNED) & (periods < end[:, None])
-    length = mine.sum(axis=1)
-    gain = np.where(mine, growth, 0.0).sum(axis=1)
+    length, gain = mine.sum(axis=1), np.where(mine, growth, 0.0).sum(axis=1)
     mean = gain.sum() / length.sum()
     spread = ((gain - mean * length) ** 2).sum()
     stderr = math.sqrt(spread * chosen.size / (chosen.size - 1)) / length.sum()
-    return float(mean), float(stderr), int(chosen.size)
-
-
-def _settling(basin_map: xr.Dataset, period: float) -> NDArray[np.int64]:
-    """Return the number of periods in which each start approaches its attractor."""
-    rate = -Units.of(facts(basin_map)).bare(basin_map["exponent"].values, RATE) * period
-    rate = np.where(np.isfinite(rate) & (rate > 0), rate, _SETTLING / _LEAST_SETTLING)
-    periods = np.clip(np.ceil(_SETTLING / rate), _LEAST_SETTLING, _MOST_SETTLING)
-    label = basin_map["label"].values.astype(np.int64)
-    by_label = np.concatenate([[0], periods]).astype(np.int64)
-    return np.asarray(by_label[np.maximum(label, 0)])
+    return float(mean), float(stderr)

@@ -1,29 +1,18 @@
-"""Trajectories: one start, or several with common times."""
+"""Trajectories: one start, or several with common times; and states some periods later."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 import xarray as xr
 
-from pendmap import _core
-from pendmap.analysis import result
-from pendmap.analysis.grid import ascending, starts
+from pendmap import _core, errors
+from pendmap.analysis import grid, result
 from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.result import Field, Found, Schema, summarised
-from pendmap.analysis.trajectories import alike, rows_of, several_facts, several_lines
-from pendmap.errors import (
-    MOST_SAMPLES,
-    InputError,
-    check_callable,
-    check_flag,
-    check_number,
-    check_whole,
-    core_errors,
-    short_repr,
-)
+from pendmap.analysis.run import RunOptions
 from pendmap.files import facts
 from pendmap.files.variables import variable
 from pendmap.formatting import counted, with_error
@@ -33,8 +22,9 @@ from pendmap.units import RATE, TIME, VELOCITY, Units
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import ArrayLike
+    from numpy.typing import ArrayLike, NDArray
 
+    from pendmap.analysis.run import Keywords
     from pendmap.model import Pendulum, Rig
     from pendmap.signal import Floats, Indices
 
@@ -43,60 +33,34 @@ if TYPE_CHECKING:
 
 _SAMPLES = 64  # Default number of samples a period
 _APART = 0.1  # Angle between two samples that looks smooth in the phase plane, rad
-_SMOOTH_SAMPLES = 200_000
-"""Total number of samples up to which a trajectory has more than ``_SAMPLES`` a period."""
-_MOST_SAMPLES = 2_000_000
-"""Total number of samples above which a trajectory has fewer than ``_SAMPLES`` a period."""
+_SMOOTH_SAMPLES = 200_000  # Samples in all up to which there are more than 64 a period
+_MOST_SAMPLES = 2_000_000  # Samples in all above which there are fewer than 64 a period
 _STRONGEST = 1e6  # Acceleration of the pivot over gravity up to which a trajectory takes seconds
-_ALIGNMENT, _BATCHES = 0.1, 20
-"""Fraction of a trajectory before the exponent is measured, number of batches; as in the core."""
-FORMULA = "(dtheta/dtau)^2 / 2 + 1 - cos(theta), over m g l"
-"""Formula of the energy, a comment in datasets."""
 
 
-def _last(name: str) -> Callable[[xr.Dataset], float]:
-    """Return a function that reads the last value of a variable."""
-    return lambda dataset: float(dataset[name].values[-1])
+def _tol_reached(dataset: xr.Dataset) -> bool:
+    return bool(dataset["reached_error"] <= dataset.attrs["tol"])
 
 
 SCHEMA = Schema(
     "trajectory",
     result.UNITS,
-    Field("t", result.OF_TIME, "last time", read=lambda dataset: dataset.attrs["until"]),
-    Field("theta", "rad", "angle at the end, not wrapped", read=_last("theta")),
-    Field("velocity", result.OF_VELOCITY, "velocity at the end", read=_last("velocity")),
+    Field("t", result.OF_TIME, "last time", read=lambda d: d.attrs["until"]),
+    Field("theta", "rad", "angle at the end, not wrapped", read=lambda d: float(d["theta"][-1])),
+    Field("velocity", result.OF_VELOCITY, "the velocity", read=lambda d: float(d["velocity"][-1])),
     Found("stuck", result.FLAG, "whether friction holds the pendulum at the end", convert=bool),
     Found("turns", "1", "full turns between start and end"),
     result.TOL,
-    Field(
-        "tol_reached",
-        "",
-        "whether the tolerance was reached",
-        read=lambda dataset: bool(dataset["reached_error"] <= dataset.attrs["tol"]),
-    ),
+    Field("tol_reached", "", "whether the tolerance was reached", read=_tol_reached),
     result.REACHED,
     Found("end_error", "1", "change of the end by a 16 times smaller error of each step"),
-    Field(
-        "interrupted",
-        "",
-        "1 where Ctrl-C ended it",
-        read=lambda dataset: bool(dataset.attrs.get("interrupted", 0)),
-    ),
-    Field("energy", "m g l", "energy at the end", read=_last("energy")),
+    Field("interrupted", "", "1 where Ctrl-C ended it", read=lambda d: "interrupted" in d.attrs),
+    Field("energy", "m g l", "energy at the end", read=lambda d: float(d["energy"][-1])),
     result.SIMD,
     Found("exponent", result.OF_RATE, "Lyapunov exponent of this stretch", None, when="lyapunov"),
-    Field(
-        "stderr",
-        result.OF_RATE,
-        "its standard error",
-        read=lambda dataset: facts(dataset).get("exponent_stderr"),
-        when="lyapunov",
-    ),
-    Found("exponent_from", result.OF_TIME, "when its measurement begins", None, when="lyapunov"),
-    Found("exponent_to", result.OF_TIME, "when its measurement ends", None, when="lyapunov"),
+    Found("stderr", result.OF_RATE, "its error", None, when="lyapunov", variable="exponent_stderr"),
     result.MISSES,
     result.SUMMARY.hidden,
-    Found("exponent_stderr", result.OF_RATE, "standard error of the exponent", None, json=False),
     Field("until", result.OF_TIME, "last time", json=False),
     Field("until_asked", result.OF_TIME, "last time that was asked for", None, json=False),
     Field("theta0", "rad", "angle at the start", json=False),
@@ -136,36 +100,31 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
     tol : float
         Error of the state after 5 periods, or at the end if that is sooner; 1e-13 to 1e-2. The
         error of each step is tightened until a 16 times smaller one changes that state by no more,
-        or until rounding forbids more, which the summary reports. ``reached_error`` is the error
-        reached, ``end_error`` the difference at the end.
+        or until rounding forbids more. ``reached_error`` is the error reached, ``end_error`` the
+        difference at the end.
     samples : int, optional
-        Samples a period; by default 64 or more. Without ``lyapunov`` a quick motion has as many as
-        a smooth curve needs, up to 200,000 in all; fewer than 64 where that would be more than two
-        million.
-        The motion does not depend on them, the batches of an exponent do.
+        Samples a period; by default 64 or more, as many as a smooth curve needs, up to 200,000 in
+        all; fewer than 64 where that would be more than two million. The motion does not depend on
+        them, the batches of an exponent do.
     lyapunov : bool
-        Whether to compute the largest Lyapunov exponent of this stretch of trajectory. Its standard
-        error is that of 20 batches, the first tenth left out (from the time ``exponent_from`` to
-        ``exponent_to``). It is the exponent of an attractor only if the
-        trajectory was on it all that time: a chaotic transient has a positive one, wherever it
-        ends. :func:`pendmap.lyapunov` computes that of the attractor. Sticking may give none.
+        Whether to compute the largest Lyapunov exponent of this stretch of trajectory, with the
+        standard error of 20 batches, the first tenth left out. A chaotic transient has a positive
+        one, wherever it ends: :func:`pendmap.lyapunov` computes that of the attractor.
     live : callable, optional
-        Called with times, angles and velocities, three arrays of one length in the units of the
-        result, of the samples that are new since the last call: about every 50 ms while it
-        integrates, and at the end. Their values are those of the result. With it Ctrl-C ends the
-        trajectory with the last sample instead of raising; the attribute ``interrupted`` is 1 then.
-        For one trajectory without ``t_eval``.
+        Called about every 50 ms, and at the end, with the times, angles and velocities of the
+        samples that are new since the last call, in the units of the result. With it Ctrl-C ends
+        the trajectory with the last sample instead of raising; the attribute ``interrupted`` is 1
+        then. For one trajectory without ``t_eval``.
 
     Returns
     -------
     xarray.Dataset
         ``theta`` (not wrapped), ``velocity`` and ``energy`` (over m g l, ``v^2 / 2 + 1 - cos
         theta``, 0 at rest) over ``time``; ``section_theta`` (wrapped to (-pi, pi]) and
-        ``section_velocity`` over ``period``; ``event_time``, ``event_kind`` (turn,
-        stick, release, stuck for ever) and ``event_theta`` over ``event``, located to rounding.
-        ``stuck`` is 1 if friction holds the pendulum at the end. With an array of starts all of
-        these are over ``start`` too; a trajectory with fewer events than another has nan and no
-        kind in their place. ``result.isel(start=0)`` is one trajectory.
+        ``section_velocity`` over ``period``; ``event_time``, ``event_kind`` (turn, stick, release,
+        stuck for ever) and ``event_theta`` over ``event``, located to rounding. ``stuck`` is 1 if
+        friction holds the pendulum at the end. With an array of starts all of these are over
+        ``start`` too, nan and no kind in the place of events that a trajectory lacks.
 
     Raises
     ------
@@ -188,112 +147,168 @@ def simulate(  # noqa: PLR0913 (physics first, numerical choices by name)
            [1.   , 0.446]])
     """
     bare, units = without_dimensions(pendulum)
-    check_callable("live", live, "three arrays, times, angles and velocities")
+    errors.check_callable("live", live, "three arrays, times, angles and velocities")
     numerics = Numerics(tol=tol)
     several = np.ndim(theta) > 0 or np.ndim(velocity) > 0
-    angles, speeds = starts(*alike(theta, velocity)) if several else _one(theta, velocity)
-    lyapunov = check_flag("lyapunov", lyapunov)
-    _refuse_strong(bare)
+    angles, speeds = _starts(theta, velocity)
+    lyapunov = errors.check_flag("lyapunov", lyapunov)
     until, wanted = _times(until, t_eval)
     given = {"samples": samples is not None, "lyapunov": lyapunov, "live": live is not None}
-    _refuse(given, timed=wanted is not None, several=several)
-    periods, end = until / pendulum.period, units.bare(until, TIME)
-    if samples is None:
-        per_start = _MOST_SAMPLES // angles.size
-        samples = int(min(_SAMPLES, max(1, per_start // max(periods, 1))))
-        if not lyapunov:  # the batches of an exponent depend on the number of samples
-            fastest = float(units.bare(np.abs(speeds).max(), VELOCITY))
-            samples = max(samples, _smooth(bare, fastest, end) // angles.size)
-    samples = check_whole("samples", samples, 1, MOST_SAMPLES)
-    number = periods * samples if wanted is None else wanted.size
-    if number * angles.size > 100 * _MOST_SAMPLES:
-        most = 100 * _MOST_SAMPLES // samples // angles.size * pendulum.period
-        raise InputError(
-            f"until must be a time up to {most:.3g}, got {until:g}: {periods:.3g} periods do not "
-            "fit into memory"
-        )
-    times, every, once = _sampled(wanted, bare, units)
+    for name, there in given.items():
+        if there and (wanted is not None or (several and name == "live")):
+            why = "with several starts" if wanted is None else "with t_eval"
+            raise errors.InputError(f"{name} must be left out {why}")
+    velocities, end = units.bare(speeds, VELOCITY), units.bare(until, TIME)
+    samples = _samples(bare, samples, velocities, end, lyapunov=lyapunov)
+    times = crossings = np.zeros(0)
+    if wanted is not None:
+        count = math.floor(end / bare.period * (1 + 1e-14)) + 1
+        crossings = np.minimum(bare.period * np.arange(count), end)
+        times = np.union1d(crossings, units.bare(wanted, TIME))
 
     def shown(times: Floats, angles: Floats, speeds: Floats) -> None:
         if live is not None:
             live(units.given(times, TIME), angles, units.given(speeds, VELOCITY))
 
     choices = (numerics.tol, samples, lyapunov, live and shown, times.tolist())
-    end = end if wanted is None else float(times[-1])
-    with core_errors():
+    with errors.core_errors():
         raws = [
             _core.simulate(bare, start, end, *choices)
-            for start in zip(angles.tolist(), units.bare(speeds, VELOCITY).tolist(), strict=True)
+            for start in zip(angles.tolist(), velocities.tolist(), strict=True)
         ]
     raw = raws[0]
-    if wanted is None:
-        every, once = np.arange(raw.time.size), np.arange(0, raw.time.size, samples)
-        if raw.time[once[-1]] < (1 - 1e-9) * once[-1] / samples * bare.period:
-            once = once[:-1]  # the end, between two samples
-    time = units.given(raw.time, TIME)
-    clock = time[every] if wanted is None else wanted
-    dataset = _dataset(raws, every, once, clock, pendulum, several=several)
-    facts_of = [
-        {
-            **_exponent(path, time, units),
-            "turns": math.trunc((float(path.theta[-1]) - angle) / math.tau),
-            "stuck": int(path.stuck),
-            "reached_error": path.reached_error,
-            "end_error": path.end_error,
-        }
-        for path, angle in zip(raws, angles, strict=True)
-    ]
+    time = clock = units.given(raw.time, TIME)
+    every, once = np.arange(time.size), np.arange(0, time.size, samples)
+    if wanted is not None:
+        every, once = (np.searchsorted(times, at) for at in (units.bare(wanted, TIME), crossings))
+        clock = wanted
+    elif raw.time[once[-1]] < (1 - 1e-9) * once[-1] / samples * bare.period:
+        once = once[:-1]  # the end, between two samples
+    dataset = _dataset(raws, every, once, clock, pendulum)
+    of_starts = [_facts(path, angle, units) for path, angle in zip(raws, angles, strict=True)]
     values = {
         **numerics.provenance(),
-        **{name: value for of_start in reversed(facts_of) for name, value in of_start.items()},
+        **{name: value for one in reversed(of_starts) for name, value in one.items()},
         "theta0": None if several else angles.item(),
         "velocity0": None if several else speeds.item(),
         "until": float(time[-1]) if raw.interrupted else until,
         "steps_per_period": max(path.steps_per_period for path in raws),
         "lyapunov": int(lyapunov),
     }
+    values["stderr"] = values.pop("exponent_stderr", None)
     if raw.interrupted:
         values |= {"interrupted": 1, "until_asked": until}
     SCHEMA.complete(dataset, pendulum, values, raw)
-    if several:
-        several_facts(dataset, facts_of, angles, speeds, units)
-    lines = several_lines(dataset, units) if several else _summary(dataset, units)
-    what = "angles and velocities here are" if several else "angle and velocity here are"
-    summarised(dataset, lines, pendulum, what)
+    if not several:
+        dataset = dataset.isel(start=0, drop=True)
+        summarised(dataset, _summary(dataset, units), pendulum, "angle and velocity here are")
+        return dataset
+    _put(dataset, of_starts, angles, speeds)
+    held, missed = int(dataset["stuck"].sum()), int((dataset["reached_error"] > numerics.tol).sum())
+    line = f"{counted(angles.size, 'start')} up to {units.at(format(until, 'g'))}; friction holds "
+    line += f"{held} of them at the end, and the tolerance was not reached by {missed}."
+    summarised(dataset, [line], pendulum, "angles and velocities here are")
     return dataset
 
 
-def _dataset(  # noqa: PLR0913 (samples and where they belong)
+def _starts(theta: ArrayLike, velocity: ArrayLike) -> tuple[Floats, Floats]:
+    """Return angles and velocities of the starts; a number as often as the other's values."""
+    shape = np.shape(theta) or np.shape(velocity) or (1,)
+    arrays = [
+        value if np.ndim(value) else np.full(shape, errors.check_number(name, value))
+        for name, value in (("theta", theta), ("velocity", velocity))
+    ]
+    angles, speeds = grid.starts(*arrays)
+    if not angles.size:
+        raise errors.InputError("theta must have one start or more, got none")
+    return angles, speeds
+
+
+def _times(until: float | None, t_eval: ArrayLike | None) -> tuple[float, Floats | None]:
+    """Return the last time, and the times of the samples if they are given."""
+    wanted = None if t_eval is None else grid.ascending("t_eval", t_eval)
+    if wanted is None:
+        end = 0.0 if until is None else errors.check_number("until", until)
+        if end <= 0:
+            text = "must be a time above 0 where t_eval is left out"
+            raise errors.InputError(f"until {text}, got {until}")
+        return end, None
+    if wanted[0] < 0 or wanted[-1] <= 0:
+        text = errors.short_repr(t_eval)
+        raise errors.InputError(f"t_eval must be times from 0, the last above 0, got {text}")
+    if until is not None and wanted[-1] > errors.check_number("until", until):
+        raise errors.InputError(f"t_eval must end by until = {until:g}, got {wanted[-1]:g}")
+    return float(wanted[-1]), wanted
+
+
+def _samples(
+    pendulum: Pendulum, given: int | None, speeds: Floats, until: float, *, lyapunov: bool
+) -> int:
+    """Return the samples a period; by default enough for a smooth curve, by the largest speed."""
+    if abs(pendulum.p) > _STRONGEST:
+        raise errors.InputError(
+            f"p must be at most {_STRONGEST:g} times gravity, got {pendulum.p:g}: the number of "
+            "steps grows with its root"
+        )
+    count, periods = speeds.size, max(until / pendulum.period, 1.0)
+    samples = given
+    if samples is None:
+        samples = int(min(_SAMPLES, max(1, _MOST_SAMPLES // count // periods)))
+    if given is None and not lyapunov:  # the batches of an exponent depend on the samples
+        velocity = float(np.abs(speeds).max())
+        pulled = velocity + abs(pendulum.torque) * until
+        if pendulum.gamma > 0:
+            pulled = min(pulled, abs(pendulum.torque) / pendulum.gamma)
+        speed = max(velocity, 2 * math.sqrt(1 + abs(pendulum.p)), pulled)
+        smooth = math.ceil(min(pendulum.period * speed / _APART, errors.MOST_SAMPLES))
+        samples = max(samples, int(min(smooth, _SMOOTH_SAMPLES // periods)) // count)
+    samples = errors.check_whole("samples", samples, 1, errors.MOST_SAMPLES)
+    if periods * samples * count > 100 * _MOST_SAMPLES:
+        text = f"{periods:.3g} periods of {samples} samples do not fit into memory"
+        raise errors.InputError(f"until must be shorter: {text}")
+    return samples
+
+
+def _dataset(
     raws: list[_core.Trajectory],
     every: Indices,
     once: Indices,
     clock: Floats,
     pendulum: Pendulum | Rig,
-    *,
-    several: bool,
 ) -> xr.Dataset:
-    """Return the samples ``every``, at times ``clock``, the section at ``once``, and the events."""
-    of, units = rows_of(raws) if several else raws[0], pendulum.units
-    theta, speed = of.theta[..., every], units.given(of.velocity, VELOCITY)
-    start = ("start",) if several else ()
-    wrapped = -np.remainder(math.pi - of.theta[..., once], math.tau) + math.pi
-    kinds, rate = np.array(of.event_kind, dtype=str), (units.of_velocity, "velocity, likewise")
-    event_time = units.given(of.event_time, TIME)
-    fell = energy(theta, speed[..., every], pendulum.attributes)
-    at, period, event = (*start, "time"), (*start, "period"), (*start, "event")
+    """Return the samples ``every``, at times ``clock``, the section at ``once``, and the events.
+
+    A trajectory with fewer events than another has nan and no kind in their place.
+    """
+    units = pendulum.units
+    theta, speed = (np.stack([getattr(raw, n) for raw in raws]) for n in ("theta", "velocity"))
+    speed = units.given(speed, VELOCITY)
+    events = len(raws), max(len(raw.event_kind) for raw in raws)
+    event_time, event_theta = np.full((2, *events), np.nan)
+    kinds = np.full(events, "", dtype="U14")
+    for k, raw in enumerate(raws):
+        count = len(raw.event_kind)
+        event_time[k, :count], event_theta[k, :count] = raw.event_time, raw.event_theta
+        kinds[k, :count] = raw.event_kind
+    wrapped = -np.remainder(math.pi - theta[:, once], math.tau) + math.pi
+    energies = energy(theta[:, every], speed[:, every], pendulum.attributes)
+    rate, crossings = units.of_velocity, units.given(raws[0].time[once], TIME)
+    at, period, event = (("start", name) for name in ("time", "period", "event"))
+    moments, formula = (
+        units.given(event_time, TIME),
+        "(dtheta/dtau)^2 / 2 + 1 - cos(theta), over m g l",
+    )
     return xr.Dataset(
         {
-            "theta": variable(at, theta, "rad", "angle, not wrapped"),
-            "velocity": variable(at, speed[..., every], units.of_velocity, units.derivative),
-            "energy": variable(at, fell, "1", "energy", FORMULA),
+            "theta": variable(at, theta[:, every], "rad", "angle, not wrapped"),
+            "velocity": variable(at, speed[:, every], rate, units.derivative),
+            "energy": variable(at, energies, "1", "energy", formula),
             "section_theta": variable(period, wrapped, "rad", "angle, once a period"),
-            "section_velocity": variable(period, speed[..., once], *rate),
-            "section_time": variable(
-                "period", units.given(raws[0].time[once], TIME), units.of_time, units.clock
-            ),
-            "event_time": variable(event, event_time, units.of_time, "time of the event"),
+            "section_velocity": variable(period, speed[:, once], rate, "velocity, likewise"),
+            "section_time": variable("period", crossings, units.of_time, units.clock),
+            "event_time": variable(event, moments, units.of_time, "time of the event"),
             "event_kind": variable(event, kinds, long_name="turn, stick or release"),
-            "event_theta": variable(event, of.event_theta, "rad", "angle of the event"),
+            "event_theta": variable(event, event_theta, "rad", "angle of the event"),
         },
         coords={
             "time": variable("time", clock, units.of_time, units.clock),
@@ -302,84 +317,30 @@ def _dataset(  # noqa: PLR0913 (samples and where they belong)
     )
 
 
-def _refuse_strong(pendulum: Pendulum) -> None:
-    """Raise InputError for a drive whose trajectories take too long."""
-    if abs(pendulum.p) > _STRONGEST:
-        raise InputError(
-            f"p must be at most {_STRONGEST:g} times gravity, got {pendulum.p:g}: the number "
-            "of steps grows with its root"
-        )
-
-
-def _refuse(given: dict[str, bool], *, timed: bool, several: bool) -> None:
-    """Raise InputError for a choice that chosen times, or several starts, do not allow."""
-    for name, there in given.items():
-        if there and (timed or (several and name == "live")):
-            why = "with t_eval" if timed else "with several starts"
-            raise InputError(f"{name} must be left out {why}")
-
-
-def _sampled(
-    wanted: Floats | None, pendulum: Pendulum, units: Units
-) -> tuple[Floats, Indices, Indices]:
-    """Return times for the core, and the places of samples and section; empty for equal samples."""
-    none = np.zeros(0, dtype=np.intp)
-    if wanted is None:
-        return np.zeros(0), none, none
-    asked, period = units.bare(wanted, TIME), pendulum.period
-    count = math.floor(asked[-1] / period * (1 + 1e-14)) + 1
-    once = np.minimum(period * np.arange(count), asked[-1])
-    times = np.union1d(once, asked)
-    return times, np.searchsorted(times, asked), np.searchsorted(times, once)
-
-
-def _one(theta: ArrayLike, velocity: ArrayLike) -> tuple[Floats, Floats]:
-    """Return one start as two arrays of length 1."""
-    pair = check_number("theta", theta), check_number("velocity", velocity)
-    return np.array(pair[:1]), np.array(pair[1:])
-
-
-def _times(until: float | None, t_eval: ArrayLike | None) -> tuple[float, Floats | None]:
-    """Return the last time, and the times of the samples if they are given."""
-    if t_eval is None:
-        if until is None:
-            raise InputError("until must be a time above 0 where t_eval is left out, got None")
-        until = check_number("until", until)
-        if until <= 0:
-            raise InputError(f"until must be a time above 0, got {until:g}")
-        return until, None
-    wanted = ascending("t_eval", t_eval)
-    if wanted[0] < 0 or wanted[-1] <= 0:
-        raise InputError(f"t_eval must be times from 0, the last above 0, got {short_repr(t_eval)}")
-    if until is not None and wanted[-1] > check_number("until", until):
-        raise InputError(f"t_eval must end by until = {until:g}, got {wanted[-1]:g}")
-    return float(wanted[-1]), wanted
-
-
-def _smooth(pendulum: Pendulum, velocity: float, until: float) -> int:
-    """Return the samples a period for a smooth curve, from an estimate of the largest speed."""
-    periods = max(until / pendulum.period, 1.0)
-    pulled = abs(velocity) + abs(pendulum.torque) * until
-    if pendulum.gamma > 0:
-        pulled = min(pulled, abs(pendulum.torque) / pendulum.gamma)
-    speed = max(abs(velocity), 2 * math.sqrt(1 + abs(pendulum.p)), pulled)
-    wanted = min(pendulum.period * speed / _APART, MOST_SAMPLES)
-    return int(min(math.ceil(wanted), _SMOOTH_SAMPLES // periods))
-
-
-def _exponent(raw: _core.Trajectory, time: Floats, units: Units) -> dict[str, float]:
-    """Return the exponent with its standard error, and the times between which it was measured."""
-    if raw.exponent is None:
-        return {}
-    first = int(_ALIGNMENT * time.size)
-    size = max(1, (time.size - first) // _BATCHES)
-    last = first + (time.size - first) // size * size - 1
-    return {
-        "exponent": units.given(raw.exponent[0], RATE),
-        "exponent_stderr": units.given(raw.exponent[1], RATE),
-        "exponent_from": float(time[max(first - 1, 0)]),
-        "exponent_to": float(time[last]),
+def _facts(path: _core.Trajectory, angle: float, units: Units) -> dict[str, Any]:
+    """Return the facts of one trajectory that began at an angle."""
+    known = {
+        "turns": math.trunc((float(path.theta[-1]) - angle) / math.tau),
+        "stuck": int(path.stuck),
+        "reached_error": path.reached_error,
+        "end_error": path.end_error,
     }
+    if path.exponent is None:
+        return known
+    value, error = units.given(np.array(path.exponent), RATE).tolist()
+    return {"exponent": value, "exponent_stderr": error, **known}
+
+
+def _put(
+    dataset: xr.Dataset, of_starts: list[dict[str, Any]], angles: Floats, speeds: Floats
+) -> None:
+    """Set the starts, and the facts of their trajectories, nan where one has none."""
+    rate = dataset["velocity"].attrs["units"]
+    dataset.coords["theta0"] = variable("start", angles, "rad", "angle at the start")
+    dataset.coords["velocity0"] = variable("start", speeds, rate, "velocity at the start")
+    for name in dict.fromkeys(name for one in of_starts for name in one):
+        column = np.array([one.get(name, np.nan) for one in of_starts])
+        dataset[name] = ("start", column.astype(dataset[name].dtype), dataset[name].attrs)
 
 
 def _summary(dataset: xr.Dataset, units: Units) -> list[str]:
@@ -392,8 +353,7 @@ def _summary(dataset: xr.Dataset, units: Units) -> list[str]:
     if a.get("interrupted"):
         asked = units.at(format(a["until_asked"], "g"))
         lines.append(f"INTERRUPTED before {asked}: the result ends where the computation stopped.")
-    error = a["end_error"]
-    at_end = f" and by {error:.1e} at the end" if math.isfinite(error) else ""
+    at_end = f" and by {a['end_error']:.1e} at the end" if math.isfinite(a["end_error"]) else ""
     lines.append(
         f"At {units.at(format(a['until'], 'g'))}: theta = {theta:.9g} rad{turns}, velocity = "
         f"{units.spoken(format(velocity, '.9g'))}."
@@ -402,31 +362,23 @@ def _summary(dataset: xr.Dataset, units: Units) -> list[str]:
         f"A 16 times smaller error of each step changes the state by {a['reached_error']:.1e} "
         f"after 5 periods{at_end} ({a['steps_per_period']} steps a period)."
     )
+    rounding = float(np.spacing(np.abs(dataset["theta"].values).max()))
     if not a["reached_error"] <= a["tol"]:
-        lines.append(
-            f"THE TOLERANCE {a['tol']:g} WAS NOT REACHED: rounding, or the smallest step allowed, "
-            f"leaves {a['reached_error']:.1e}."
-        )
+        lines.append(f"THE TOLERANCE {a['tol']:g} WAS NOT REACHED: rounding forbids smaller steps.")
     rounding = float(np.spacing(np.abs(dataset["theta"].values).max()))
     if rounding > a["tol"]:
-        lines.append(
-            f"ANGLES ARE ROUNDED TO {rounding:.1e} rad because they are large: start nearer to 0."
-        )
+        lines.append(f"ANGLES ARE ROUNDED TO {rounding:.1e} rad: start nearer to 0.")
     if a["stuck"]:
         kinds, times = dataset["event_kind"].values, dataset["event_time"].values
         ever = ", permanently" if kinds[-1] == "stuck for ever" else ""
         lines.append(f"Friction holds it since {units.at(format(times[-1], '.9g'))}{ever}.")
     if a["end_error"] > max(1e-3, a["tol"]):
-        lines.append(
-            "The end is not predictable at this length: read the motion, not its last state."
-        )
+        lines.append("The end is not predictable: read the motion, not its last state.")
     if "exponent" in a:
-        value, error = a["exponent"], a["exponent_stderr"]
         lines.append(
-            f"Largest Lyapunov exponent of this stretch, {units.clock} = "
-            f"{a['exponent_from']:.6g} to {units.seconds(format(a['exponent_to'], '.6g'))}: "
-            f"{with_error(value, error)} {units.per_time}. Transients are included; basins gives "
-            "the exponents of the attractors."
+            "Largest Lyapunov exponent of this stretch, the first tenth left out: "
+            f"{with_error(a['exponent'], a['exponent_stderr'])} {units.per_time}. Transients are "
+            "included; basins gives the exponents of the attractors."
         )
     return lines
 
@@ -434,5 +386,63 @@ def _summary(dataset: xr.Dataset, units: Units) -> list[str]:
 def energy(theta: Floats, velocity: Floats, attributes: Any) -> Floats:  # noqa: ANN401 (a mapping)
     """Return ``E / (m g l) = v^2 / 2 + 1 - cos theta``, ``v = d theta / d tau`` about the pivot."""
     speed = Units.of(attributes).bare(velocity, VELOCITY)
-    energies: Floats = 0.5 * speed**2 + 1.0 - np.cos(theta)
-    return energies
+    return np.asarray(0.5 * speed**2 + 1.0 - np.cos(theta))
+
+
+def advance(  # noqa: PLR0913 (as for basins)
+    pendulum: Pendulum | Rig,
+    theta: ArrayLike,
+    velocity: ArrayLike,
+    periods: int,
+    *,
+    tol: float = 1e-6,
+    run: RunOptions | None = None,
+    **options: Unpack[Keywords],
+) -> tuple[Floats, Floats, NDArray[np.int64]]:
+    """Advance many starts by the same number of periods.
+
+    Parameters
+    ----------
+    pendulum : Pendulum or Rig
+        The model; with a rig velocities are in rad/s.
+    theta, velocity : array_like, shape (N,)
+        Angles in rad and velocities at ``tau = 0``.
+    periods : int
+        Forcing periods (of ``2 pi`` where p = 0); 0 or more.
+    tol, run
+        As for :func:`pendmap.basins`.
+
+    Returns
+    -------
+    theta, velocity : ndarray, shape (N,)
+        Angles wrapped to [-pi, pi] and velocities.
+    turns : ndarray of int, shape (N,)
+        Net full turns.
+
+    Raises
+    ------
+    InputError
+        If the lengths differ, a start is not finite, or a value is outside its range.
+
+    Examples
+    --------
+    >>> import pendmap
+    >>> pendulum = pendmap.Pendulum(gamma=0.1, p=0.6, omega=2.0)
+    >>> theta, velocity, turns = pendmap.advance(pendulum, [0.5], [0.0], 40)
+    >>> theta.round(3), velocity.round(3)
+    (array([1.318]), array([-0.27]))
+    """
+    pendulum, units = without_dimensions(pendulum)
+    run = RunOptions.of(run, options).in_memory("advance")
+    numerics = Numerics(run, tol)
+    angles, speeds = grid.starts(theta, velocity)
+    speeds = units.bare(speeds, VELOCITY)
+    periods = errors.check_whole("periods", periods, 0, errors.MOST_PERIODS)
+    with errors.core_errors():
+        every = max(1, angles.size // 400)
+        sample = angles[::every].copy(), speeds[::every].copy()
+        steps, _ = _core.choose_steps(pendulum, *sample, numerics.tol)
+        end, speed, turns = _core.advance(
+            pendulum, angles, speeds, periods, steps, run.workers, run.progress
+        )
+    return end, units.given(speed, VELOCITY), turns

@@ -13,7 +13,7 @@ from pendmap.charts.chart import Chart, Panel, holding
 from pendmap.charts.legend import colours_of, typeset
 from pendmap.charts.marks import DASHED, INK, NONE, QUIET, Line, Mark, Points, together
 from pendmap.files import facts
-from pendmap.formatting import counted, typographic
+from pendmap.formatting import typographic
 from pendmap.units import VELOCITY, Units
 
 if TYPE_CHECKING:
@@ -36,12 +36,6 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     box = (float(dataset.attrs["low_velocity"]), float(dataset.attrs["high_velocity"]))
     velocity = holding(every[:, 1]) if every.size else box
     marks: list[Mark] = []
-    draws, over = int(dataset.attrs.get("draws", 0)), ""
-    if draws:
-        at = np.stack([dataset[f"drawn_{n}"].values.ravel() for n in ("theta", "velocity")], axis=1)
-        at = plane.copies(dataset, at[np.isfinite(at[:, 0])], *theta)
-        marks.append(Points(*at.T, marker=".", size=3.0, colour=QUIET, order=3.0))
-        over = f";   grey dots: {counted(draws, 'draw')}"
     # Stable orbits are drawn last, on top.
     stable = dataset["stable"].values.astype(bool)
     colours = colours_of(dataset)
@@ -58,7 +52,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     sides = names.phase_plane(theta, velocity, units)
     return Chart(
         f"{some} {which}" if count else f"No orbit {which}",
-        names.parameters(facts(dataset)) + over,
+        names.parameters(facts(dataset)),
         [[Panel("phase", "", *sides, marks)]],
         ratio=min(max((high - low) / (theta[1] - theta[0]), 0.6), 1.1),
     ).only(layer)

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from pendmap.analysis.critical_curves import in_plane, window
-from pendmap.analysis.tongues import NEAR
+from pendmap.analysis.tongues import NEAR, in_plane, window
 from pendmap.charts import names
 from pendmap.charts.chart import Axis, Chart, Panel
 from pendmap.charts.marks import QUIET, Areas, Line, Mark, Points, Text, this_pendulum, together
@@ -98,15 +97,11 @@ def _panel(dataset: xr.Dataset, plane: str, marks: Sequence[tuple[float, float, 
     lines = [line for m in _CURVES for line in critical("undamped_", m)]
     text = "exact, without damping" if float(attrs["gamma"]) > 0 and lines else ""
     drawn.append(curve(lines, colour=QUIET, width=0.6, name=text, path="undamped"))
-    fold = np.stack([omega, dataset["fold"].values], axis=-1)[dataset["fold_sought"].values > 0]
+    fold = np.stack([omega, dataset["fold"].values], axis=-1)[dataset["asked"].values > 0]
     text = "fold: the oscillation exists from here" if np.isfinite(to(fold)).any() else ""
     look = {"colour": _FOLD, "width": 1.6, "dash": (5.0, 2.0), "order": 2.1}
     drawn.append(Line(*to(fold).T, name=text, path="fold", **look))
     drawn += _asymptotic(dataset, to)
-    bands = [band for prefix in ("", "inverted_") for band in _bands(dataset, prefix)]
-    if bands:
-        text = "95 % of the draws"
-        drawn.append(curve(bands, colour=QUIET, width=3.0, alpha=0.5, name=text))
     edge = to(np.stack([omega, np.full_like(omega, p_max)], axis=-1))
     if (edge[:, 1] < 0.995 * top).any():
         drawn.append(Line(*edge.T, colour="#c8c8c8", width=3.0, name="largest p computed", order=1))
@@ -137,16 +132,6 @@ def _asymptotic(dataset: xr.Dataset, to: Callable[[Floats], Floats]) -> list[Mar
             Line(*parting.T, dash=look, width=0.5, alpha=0.45),
         ]
     return drawn
-
-
-def _bands(dataset: xr.Dataset, prefix: str) -> list[Floats]:
-    """Return the interval of each critical amplitude over draws, as points (omega, p)."""
-    if f"{prefix}p_low" not in dataset:
-        return []
-    low, high = (dataset[f"{prefix}p_{end}"].values for end in ("low", "high"))
-    omega, _ = _points(dataset, prefix)
-    ends = np.stack([np.stack([omega, low], axis=1), np.stack([omega, high], axis=1)], axis=1)
-    return [*ends[np.isfinite(low)]]
 
 
 def joined(omega: Floats, at: Floats, p: Floats) -> list[Floats]:

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     "orbit",
     "n w",
     window_options("-pi:pi:200", "depends on n, w and p"),
-    "draws",
     example="--n 2 --w 0",
     examples=(
         "pendmap orbit --p 1.3 --n 2 --w 0",

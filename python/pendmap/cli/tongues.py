@@ -23,7 +23,7 @@ if TYPE_CHECKING:
         "Frequencies Omega/w0 of the drive.  [default: 0.5:3:200]",
         group=group("Frequencies", "--omega 0.5:3:200"),
     ),
-    "p_max plane draws",
+    "p_max plane",
     example="--p-max 6 --plane e-alpha2",
     examples=(
         "pendmap tongues --omega 0.5:3:200 --p-max 6",
@@ -35,6 +35,6 @@ def command(_: object, outputs: Outputs, **given: Any) -> dict[str, Any]:  # noq
     """Find where rest, hanging and inverted, is stable: critical curves of eq. 1.3, exact.
 
     Also without damping; folds of the oscillation born there; curves by perturbation. For files,
-    frequencies are added where curves turn, end or bend; --json lists the requested ones.
+    frequencies are added where curves turn back; --json lists the requested ones.
     """
     return {"omega": given.pop("omegas"), "refine": outputs.draws, **given}

@@ -1,4 +1,4 @@
-"""Models drawn from a covariance, and basins over them, against known distributions."""
+"""Models drawn from a covariance, and results over them, against known distributions."""
 
 from __future__ import annotations
 
@@ -15,8 +15,7 @@ from scipy.stats import norm, truncnorm
 import pendmap
 from pendmap import Axis, Effect, Grid, InputError, Pendulum, Rig, RunOptions
 from pendmap._core import Attractor
-from pendmap.analysis.draws import Draws, drawn
-from pendmap.analysis.draws.basins import basins_over
+from pendmap.analysis.draws import Draws, basins_over, drawn
 from pendmap.analysis.orbit_table import described
 
 if TYPE_CHECKING:
@@ -48,14 +47,13 @@ def test_the_spread_between_runs_adds_to_the_variance() -> None:
 
 
 def test_a_few_draws_are_the_first_of_many() -> None:
-    rig, run = Rig(w0=6.2, notes=noted(["w0"], [[1e-4]])), RunOptions(seed=SEED)
-    assert np.array_equal(
-        drawn(rig, 5, RunOptions(seed=SEED)).values,
-        drawn(rig, 50, RunOptions(seed=SEED)).values[:5],
+    rig = Rig(w0=6.2, notes=noted(["w0"], [[1e-4]]))
+    few, many, other = (
+        drawn(rig, count, RunOptions(seed=seed)).values
+        for count, seed in ((5, SEED), (50, SEED), (5, SEED + 1))
     )
-    assert not np.array_equal(
-        drawn(rig, 5, run).values, drawn(rig, 5, RunOptions(seed=SEED + 1)).values
-    )
+    assert np.array_equal(few, many[:5])
+    assert not np.array_equal(few, other)
 
 
 @pytest.mark.parametrize("name", ["c_over_m", "Tr", "quadratic_drag.q"])
@@ -69,13 +67,6 @@ def test_damping_and_friction_are_drawn_from_a_gaussian_cut_off_at_0(name: str) 
     expected = truncnorm(-0.5, math.inf, loc=0.01, scale=0.02)
     assert values.mean() == pytest.approx(expected.mean(), abs=4 * expected.std() / math.sqrt(4000))
     assert values.std() == pytest.approx(expected.std(), rel=0.08)
-
-
-def test_parameters_of_either_sign_are_drawn_with_both() -> None:
-    bias = Effect("bias_torque", {"torque": 0.0})
-    rig = Rig(w0=6.2, effects=(bias,), notes=noted(["bias_torque.torque"], [[1e-4]]))
-    values = drawn(rig, 400, RunOptions(seed=SEED)).values
-    assert 120 < (values < 0).sum() < 280
 
 
 @pytest.mark.parametrize(
@@ -131,7 +122,7 @@ def test_a_boundary_that_shifts_with_a_normal_parameter_has_a_normal_distributio
     pendulum = Pendulum(gamma=gamma, p=0.0, torque=torque, effects=(tilt,), notes=notes)
     half = 0.2
     grid = Grid(Axis(edge - half, edge + half, 101), Axis(velocity - 1e-9, velocity + 1e-9, 1))
-    result = pendmap.basins(pendulum, grid, draws=count, run=pendmap.RunOptions(seed=SEED))
+    result = pendmap.basins(pendulum, grid, draws=count, run=RunOptions(seed=SEED))
     names = [str(name) for name in result.outcome.values]
     assert names == ["rest", "rotation 1:+1"]
     rests = result.probability.values[0, 0]
@@ -237,3 +228,52 @@ def test_two_attractors_of_one_name_are_distinguished_by_position() -> None:
     found = gathered([own, own, moved])
     assert [*found.outcome.values] == names
     assert found.share_mean.values == pytest.approx([0.4, 0.6])
+
+
+def damped(p: float, spread: float) -> Pendulum:
+    """Return a driven pendulum whose damping has the given standard error."""
+    notes = {"covariance": {"names": ["gamma"], "matrix": [[spread**2]]}}
+    return Pendulum(gamma=0.1, p=p, omega=2.0, notes=notes)
+
+
+def growth(gamma: float, p: float, omega: float = 2.0) -> float:
+    """Return the largest modulus of the multipliers of hanging rest, by scipy."""
+
+    def equation(tau: float, x: np.ndarray) -> list[float]:
+        pull = 1 + p * math.cos(omega * tau)
+        return [x[1], -gamma * x[1] - pull * x[0], x[3], -gamma * x[3] - pull * x[2]]
+
+    run = solve_ivp(
+        equation, (0, math.tau / omega), [1, 0, 0, 1], method="DOP853", rtol=1e-12, atol=1e-12
+    )
+    return float(np.abs(np.linalg.eigvals(run.y[:, -1].reshape(2, 2))).max())
+
+
+def test_the_probability_of_a_regime_is_its_share_of_the_draws() -> None:
+    """Hanging rest attracts if its multipliers, by scipy, lie within the unit circle."""
+    model = damped(0.2, 0.02)
+    ranges = {"p": (0.14, 0.26, 7), "omega": (2.0, 2.0, 1)}
+    result = pendmap.parameter_map(model, ranges, draws=16, run=RunOptions(seed=SEED))
+    rests = result["outcome_has"].sel(outcome_kind="rest").values.astype(bool)
+    probability = result.probability.values[rests].sum(axis=0)[0]
+    gammas = result.drawn.values[:, 0]
+    exact = [np.mean([growth(g, p) < 1 for g in gammas]) for p in result.p.values]
+    assert probability == pytest.approx(exact)
+    assert 0 < min(exact[2:5]) < 1
+    assert result.probability.values.sum(axis=0) == pytest.approx(1)
+    counted = result.drawn_share.values.mean(axis=1)
+    assert result.share_mean.values == pytest.approx(counted)
+    assert result["sure_cells"].item() == pytest.approx((result.certainty.values >= 0.95).mean())
+
+
+def test_a_lifetime_has_the_interval_of_its_draws() -> None:
+    model = damped(1.2, 0.005)
+    result = pendmap.lifetime(model, starts=1500, draws=4, run=RunOptions(seed=SEED))
+    models = [Pendulum(gamma=gamma, p=1.2) for gamma in result.drawn.values[:, 0]]
+    alone = [pendmap.lifetime(one, starts=1500, run=RunOptions(seed=SEED)) for one in models]
+    means = [one["mean_periods"].item() for one in alone]
+    assert result.drawn_mean_periods.values == pytest.approx(means)
+    assert len(set(means)) == 4
+    ends = [result[f"mean_periods_{end}"].item() for end in ("low", "high")]
+    assert ends == pytest.approx(np.quantile(means, [0.025, 0.975]))
+    assert result["transient_share"].item() == 1

@@ -1,4 +1,4 @@
-"""Maps, orbits, lifetimes and critical curves over draws; models that miss their records."""
+"""Draws of fitted models in commands and figures; models that miss their records."""
 
 from __future__ import annotations
 
@@ -11,10 +11,9 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
 
 import pendmap
-from pendmap import Grid, InputError, Pendulum, Rig, cli, render, viewer
+from pendmap import InputError, Pendulum, Rig, cli, render, viewer
 from pendmap.identification import identify
 from pendmap.identification.experiment import identified_model, provenance
 
@@ -37,110 +36,13 @@ noise = 0.001
 """
 
 
-def damped(p: float, spread: float) -> Pendulum:
-    """Return a driven pendulum whose damping has the given standard error."""
-    notes = {"covariance": {"names": ["gamma"], "matrix": [[spread**2]]}}
-    return Pendulum(gamma=0.1, p=p, omega=2.0, notes=notes)
-
-
-def growth(gamma: float, p: float, omega: float = 2.0) -> float:
-    """Return the largest modulus of the multipliers of hanging rest, by scipy."""
-
-    def equation(tau: float, x: np.ndarray) -> list[float]:
-        pull = 1 + p * math.cos(omega * tau)
-        return [x[1], -gamma * x[1] - pull * x[0], x[3], -gamma * x[3] - pull * x[2]]
-
-    run = solve_ivp(
-        equation, (0, math.tau / omega), [1, 0, 0, 1], method="DOP853", rtol=1e-12, atol=1e-12
-    )
-    return float(np.abs(np.linalg.eigvals(run.y[:, -1].reshape(2, 2))).max())
-
-
-def test_the_probability_of_a_regime_is_its_share_of_the_draws() -> None:
-    """Hanging rest attracts if its multipliers, by scipy, lie within the unit circle."""
-    model = damped(0.2, 0.02)
-    ranges = {"p": (0.14, 0.26, 7), "omega": (2.0, 2.0, 1)}
-    result = pendmap.parameter_map(model, ranges, draws=16, run=pendmap.RunOptions(seed=SEED))
-    rests = result["outcome_has"].sel(outcome_kind="rest").values.astype(bool)
-    probability = result.probability.values[rests].sum(axis=0)[0]
-    gammas = result.drawn.values[:, 0]
-    exact = [np.mean([growth(g, p) < 1 for g in gammas]) for p in result.p.values]
-    assert probability == pytest.approx(exact)
-    assert 0 < min(exact[2:5]) < 1
-    assert result.probability.values.sum(axis=0) == pytest.approx(1)
-    counted = result.drawn_share.values.mean(axis=1)
-    assert result.share_mean.values == pytest.approx(counted)
-    assert result["sure_cells"].item() == pytest.approx((result.certainty.values >= 0.95).mean())
-
-
-def test_orbits_over_draws_have_the_multipliers_of_each_draw() -> None:
-    model = damped(0.2, 0.02)
-    result = pendmap.orbit(model, 1, 0, draws=20, run=pendmap.RunOptions(seed=SEED))
-    gammas = result.drawn.values[:, 0]
-    rest = [str(name) for name in result.orbit.values].index("rest")
-    pairs = result.drawn_multipliers.values[rest]
-    product = (pairs[0, 0] + 1j * pairs[0, 1]) * (pairs[1, 0] + 1j * pairs[1, 1])
-    assert np.abs(product - np.exp(-gammas * math.pi)).max() < 1e-10
-    stable = [growth(g, 0.2) < 1 for g in gammas]
-    assert 0 < np.mean(stable) < 1
-    assert float(result.stable_share[rest]) == pytest.approx(np.mean(stable))
-    assert result.exists.values == pytest.approx(1)
-    assert float(result.theta_spread[rest]) == 0
-    spread = np.hypot(*np.moveaxis(pairs, 1, 0)).std(axis=1, ddof=1)
-    assert result.multipliers_spread.values[rest, :, 0] == pytest.approx(spread, rel=1e-6)
-
-
-def test_an_orbit_is_missing_for_draws_beyond_its_bifurcation() -> None:
-    """The oscillation of period 2 exists only if rest is unstable, here above p = 0.2."""
-    result = pendmap.orbit(damped(0.21, 0.02), 2, 0, draws=20, run=pendmap.RunOptions(seed=SEED))
-    assert result.sizes["orbit"] == 1
-    gammas = result.drawn.values[:, 0]
-    # At omega = 2 rest loses stability toward larger p: the oscillation exists if rest is unstable.
-    there = np.array([growth(g, 0.21) > 1 for g in gammas])
-    assert 0 < there.mean() < 1
-    assert float(result.exists[0]) == pytest.approx(there.mean())
-    assert np.array_equal(np.isfinite(result.drawn_theta.values[0]), there)
-
-
-def test_the_band_of_a_critical_curve_has_the_quantiles_of_the_draws() -> None:
-    result = pendmap.tongues(
-        damped(0.2, 0.02), [1.9, 2.0, 2.2], 1.0, draws=12, run=pendmap.RunOptions(seed=SEED)
-    )
-    gammas = result.drawn.values[:, 0]
-    k = int(np.flatnonzero(result.critical_omega.values == 2.0)[0])
-    exact = [brentq(lambda p, g=g: growth(g, p) - 1, 0.05, 0.5, xtol=1e-11) for g in gammas]
-    assert result.drawn_p.values[k] == pytest.approx(exact, abs=1e-8)
-    low, high = np.quantile(exact, [0.025, 0.975])
-    assert [float(result.p_low[k]), float(result.p_high[k])] == pytest.approx([low, high])
-    assert result.exists.values == pytest.approx(1)
-
-
-def test_a_lifetime_has_the_interval_of_its_draws() -> None:
-    model = damped(1.2, 0.005)
-    result = pendmap.lifetime(model, starts=1500, draws=4, run=pendmap.RunOptions(seed=SEED))
-    means = [
-        pendmap.lifetime(Pendulum(gamma=g, p=1.2), starts=1500, run=pendmap.RunOptions(seed=SEED))[
-            "mean_periods"
-        ].item()
-        for g in result.drawn.values[:, 0]
-    ]
-    assert result.drawn_mean_periods.values == pytest.approx(means)
-    assert len(set(means)) == 4
-    ends = [result[f"mean_periods_{end}"].item() for end in ("low", "high")]
-    assert ends == pytest.approx(np.quantile(means, [0.025, 0.975]))
-    assert result["transient_share"].item() == 1
-
-
 COMMANDS = {
     "basins": ("--grid", "10"),
     "map": ("--p", "0.3:0.6:2", "--omega", "1.8:2.0:2", "--starts", "2"),
-    "orbit": ("--n", "2", "--grid", "40"),
     "lifetime": ("--starts", "100"),
-    "tongues": ("--omega", "1.8:2.2:3", "--p-max", "1"),
-    "bifurcation": ("--vary", "c_over_m", "0.3:0.6:3", "--starts", "2"),
     "lyapunov": (),
 }
-WITHOUT = ("bifurcation", "lyapunov")
+WITHOUT = ("lyapunov",)
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -176,9 +78,8 @@ def test_results_report_a_model_that_misses_its_record(
 
 @pytest.mark.parametrize("layer", ["probability", "entropy"])
 def test_the_layers_over_draws_are_drawn(layer: str, tmp_path: Path) -> None:
-    result = pendmap.basins(
-        damped(0.6, 0.01), Grid.square(12), draws=3, run=pendmap.RunOptions(seed=SEED)
-    )
+    notes = {"covariance": {"names": ["gamma"], "matrix": [[1e-4]]}}
+    result = pendmap.basins(Pendulum(gamma=0.1, p=0.6, notes=notes), 12, draws=3)
     render.draw(result, tmp_path / "a.png", layer=layer, dpi=50)
     render.draw(result.isel(theta=slice(2, 9)), tmp_path / "b.png", layer=layer, dpi=50)
     with pytest.raises(InputError, match="no layer"):

@@ -58,7 +58,7 @@ def test_other_distributions_are_rejected(seed: int) -> None:
     for times in (draw.uniform(0, 300, 20_000), 50 * draw.weibull(2.0, 20_000)):
         whole = np.ceil(times).astype(int)
         assert not survival.tail(whole, 0, BOUND, 5).is_exponential
-    # Each of both tests rejects exponential times with probability about one tenth.
+    # Exponential times are rejected with a probability of about one tenth at most.
     called = [
         survival.tail(np.ceil(draw.exponential(80.0, 2000)).astype(int), 0, BOUND, 0)
         for _ in range(60)
@@ -76,22 +76,10 @@ def test_against_the_reference(p: float, truths: dict[str, Any]) -> None:
     found = pendmap.lifetime(Pendulum(gamma=0.1, p=p, omega=2.0))
     a = facts(found)
     assert (a["persistent"], a["transient_chaos"]) == (0, 1)
-    assert min(a["tail_weibull"], a["tail_steady"]) > 0.05
+    assert a["tail_chance"] > 0.05
     for known in truths["transient_lifetime_periods"][f"w2.0_p{p}"]["tail"]:
         gap = abs(a["mean_periods"] - known["mean"])
         assert gap < 3 * math.hypot(a["mean_periods_stderr"], known["stderr"]), known
-
-
-def test_the_error_is_the_spread_over_seeds() -> None:
-    found = [
-        facts(pendmap.lifetime(Pendulum(p=1.2), starts=6000, run=pendmap.RunOptions(seed=k)))
-        for k in range(20)
-    ]
-    means = np.array([a["mean_periods"] for a in found])
-    errors = np.array([a["mean_periods_stderr"] for a in found])
-    spread = (((means - np.average(means, weights=errors**-2)) / errors) ** 2).sum()
-    # Chi squared with 19 degrees of freedom: outside once in five hundred.
-    assert 5.5 < spread < 43, spread
 
 
 def test_the_tail_is_that_of_the_starts(long: xr.Dataset) -> None:
@@ -159,12 +147,9 @@ def test_without_damping_nothing_is_captured() -> None:
 
 def test_the_result_depends_on_starts() -> None:
     model = Pendulum(p=1.2, effects=(Effect("quadratic_drag", {"q": 0.01}),))
-    one = pendmap.lifetime(model, starts=2000)
-    same = pendmap.lifetime(model, one["start_theta"].values, one["start_velocity"].values)
+    one, same, other = (pendmap.lifetime(model, starts=2000, seed=seed) for seed in (0, 0, 1))
     assert same["mean_periods"].item() == one["mean_periods"].item()
-    assert not one["capture_period"].equals(
-        pendmap.lifetime(model, starts=2000, run=pendmap.RunOptions(seed=1))["capture_period"]
-    )
+    assert not one["capture_period"].equals(other["capture_period"])
 
 
 @pytest.mark.parametrize(
@@ -172,7 +157,6 @@ def test_the_result_depends_on_starts() -> None:
     [
         ({"starts": 10}, "starts must be a whole number from 100 .*, got 10"),
         ({"from_period": -1}, "from_period must be .*, got -1"),
-        ({"theta": [0.1]}, "both or none of theta and velocity must be given"),
     ],
 )
 def test_invalid_arguments_are_refused(given: dict[str, Any], match: str) -> None:

@@ -13,9 +13,9 @@ from scipy.integrate import solve_ivp
 from scipy.special import mathieu_a, mathieu_b
 
 import pendmap
-from drawn import made, named, plain
+from drawn import made, plain
 from pendmap import Effect, Formula, Pendulum
-from pendmap.analysis import critical_curves
+from pendmap.analysis.tongues import CURVES
 from pendmap.charts import tongues as drawn
 
 if TYPE_CHECKING:
@@ -89,26 +89,22 @@ def largest_multiplier(p: float, omega: float, gamma: float, gravity: float = 1.
     return float(np.abs(np.linalg.eigvals(np.array(ends).T)).max())
 
 
-def test_stable_means_that_motions_decay() -> None:
-    omega = 0.8
-    found = pendmap.tongues(DAMPED, omega)
-    edges = [0.0, *found["p"].values, 6.0]
-    stable = [int(found["stable_at_first"][0]), *found["stable_above"].values]
-    for low, high, yes in zip(edges[:-1], edges[1:], stable, strict=True):
-        assert (largest_multiplier((low + high) / 2, omega, 0.1) < 1) == bool(yes)
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_inverted_rest_is_stable_where_its_motions_decay(seed: int) -> None:
-    random = np.random.default_rng(seed)
-    omega, gamma = float(random.uniform(1.2, 9.0)), float(random.choice([0.0, 0.02, 0.5]))
-    found = pendmap.tongues(Pendulum(gamma=gamma), omega, 30.0)
-    edges = [0.0, *found["inverted_p"].values, 30.0]
-    stable = [0, *found["inverted_stable_above"].values]
+@pytest.mark.parametrize(
+    ("omega", "gamma", "prefix", "p_max"),
+    [(0.8, 0.1, "", 6.0), (2.5, 0.0, "inverted_", 30.0), (6.0, 0.5, "inverted_", 30.0)],
+)
+def test_stable_means_that_motions_decay(
+    omega: float, gamma: float, prefix: str, p_max: float
+) -> None:
+    found = pendmap.tongues(Pendulum(gamma=gamma), omega, p_max)
+    edges = [0.0, *found[f"{prefix}p"].values, p_max]
+    first = 0 if prefix else int(found["stable_at_first"][0])
+    stable = [first, *found[f"{prefix}stable_above"].values]
     assert 1 in stable
+    gravity = -1.0 if prefix else 1.0
     for low, high, yes in zip(edges[:-1], edges[1:], stable, strict=True):
-        for p in random.uniform(low, high, 4):
-            assert (largest_multiplier(p, omega, gamma, -1.0) < 1 + 1e-6) == bool(yes), p
+        for p in (low + (high - low) * part for part in (0.2, 0.5, 0.9)):
+            assert (largest_multiplier(p, omega, gamma, gravity) < 1 + 1e-6) == bool(yes), p
 
 
 def test_hanging_rest_alone_is_computed_where_upright_is_no_rest() -> None:
@@ -155,11 +151,11 @@ def orbits_near(
     return list(found.values())
 
 
-@pytest.mark.parametrize(("omega", "torque"), [(6.0, 0.3), (2.0, 0.05), (9.0, -0.6)])
+@pytest.mark.parametrize(("omega", "torque"), [(6.0, 0.3), (9.0, -0.6)])
 def test_under_a_torque_orbits_are_stable_where_scipy_finds_them_so(
     omega: float, torque: float
 ) -> None:
-    found = pendmap.tongues(Pendulum(gamma=0.1, torque=torque), omega, 45.0 if omega > 3 else 5.0)
+    found = pendmap.tongues(Pendulum(gamma=0.1, torque=torque), omega, 45.0)
     low, high = found["inverted_p"].values[:2]
     assert found["inverted_multiplier"].values[:2].tolist() == [1, -1]
     assert found["inverted_stable_above"].values[:2].tolist() == [1, 0]
@@ -179,20 +175,6 @@ def test_under_a_torque_orbits_are_stable_where_scipy_finds_them_so(
     assert stable(rest, 0.99 * first)
 
 
-def test_the_curves_of_a_small_torque_are_those_without() -> None:
-    # Folds shift with the torque to the power 2/3, the others with its square. The torque replaces
-    # a pitchfork of rest by a period-1 orbit that continues.
-    for omega in (2.0, 6.0):
-        level, tilted = (
-            pendmap.tongues(Pendulum(gamma=0.1, torque=torque), omega, 20.0)
-            for torque in (0.0, 1e-6)
-        )
-        assert np.allclose(level["inverted_p"][:2], tilted["inverted_p"][:2], atol=2e-3)
-        for prefix in ("", "inverted_"):
-            doubled = level[f"{prefix}p"].values[level[f"{prefix}multiplier"].values < 0]
-            assert all(abs(tilted[f"{prefix}p"].values - p).min() < 1e-7 for p in doubled)
-
-
 def test_a_mirrored_torque_has_the_same_curves_and_no_orbit_is_counted_twice() -> None:
     omega = np.linspace(1.55, 1.75, 5)
     one, other = (
@@ -204,9 +186,9 @@ def test_a_mirrored_torque_has_the_same_curves_and_no_orbit_is_counted_twice() -
         assert (np.diff(one["p"].values[one["index"].values == k]) > 1e-6).all()
 
 
-@pytest.mark.parametrize("name", list(critical_curves.CURVES))
+@pytest.mark.parametrize("name", CURVES)
 def test_errors_of_asymptotic_curves_have_their_order(name: str) -> None:
-    multiplier, formula = critical_curves.CURVES[name]
+    multiplier, formula = CURVES[name]
     # Toward the tip, with damping in proportion: detuning, p and gamma (or its root) are all small.
     errors = []
     for size in (0.08, 0.04):
@@ -229,35 +211,26 @@ def test_added_damping_is_damping_and_effects_are_included() -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "match"),
+    ("model", "given", "match"),
     [
-        ({"theta_r": 0.05}, "theta_r must be 0, got 0.05: friction holds"),
-        ({"effects": (Effect("coulomb_friction", {"theta_r": 0.05}),)}, "friction holds"),
+        ({"theta_r": 0.05}, {}, "theta_r must be 0, got 0.05: friction holds"),
+        ({"effects": (Effect("coulomb_friction", {"theta_r": 0.05}),)}, {}, "friction holds"),
         (
             {"effects": (Effect("lateral_drive", {"e": 0.1, "phase": 0.0}),)},
+            {},
             "a sideways drive or an effect moves it",
         ),
-        ({"effects": (Effect("drive_chirp", {"r": 0.001}),)}, "drive_chirp"),
+        ({"effects": (Effect("drive_chirp", {"r": 0.001}),)}, {}, "drive_chirp"),
+        ({}, {"omega": [2.0, 1.0]}, "ascending"),
+        ({}, {"omega": 0.0}, "above 0"),
+        ({}, {"p_max": 0.0}, "p_max must be .*, got 0"),
+        ({}, {"p_max": 2.1e5, "omega": [2.0, 3.0]}, "up to 50000 times the square of the lowest"),
+        ({}, {"plane": "q-a"}, "e-alpha2"),
     ],
 )
-def test_models_without_critical_curves_are_refused(given: dict[str, Any], match: str) -> None:
+def test_bad_requests_are_refused(model: dict[str, Any], given: dict[str, Any], match: str) -> None:
     with pytest.raises(pendmap.InputError, match=match):
-        pendmap.tongues(Pendulum(**given), 2.0)
-
-
-@pytest.mark.parametrize(
-    ("given", "match"),
-    [
-        ({"omega": [2.0, 1.0]}, "ascending"),
-        ({"omega": 0.0}, "above 0"),
-        ({"p_max": 0.0}, "p_max must be .*, got 0"),
-        ({"p_max": 2.1e5, "omega": [2.0, 3.0]}, "up to 50000 times the square of the lowest omega"),
-        ({"plane": "q-a"}, "e-alpha2"),
-    ],
-)
-def test_bad_values_are_named(given: dict[str, Any], match: str) -> None:
-    with pytest.raises(pendmap.InputError, match=match):
-        pendmap.tongues(DAMPED, **given)
+        pendmap.tongues(Pendulum(**model), **{"omega": 2.0} | given)
 
 
 @pytest.fixture(scope="module")
@@ -271,8 +244,8 @@ def test_the_figure_in_both_planes(whole: xr.Dataset, plane: str) -> None:
     axes = figure.axes[0]
     assert ("e = p" in plain(axes.get_ylabel())) == (plane == "e-alpha2")
     texts = [text.get_text() for text in figure.subfigs[0].legends[0].get_texts()]
-    for name in ("multiplier", "hanging rest is stable", "inverted rest is stable"):
-        assert any(name in text for text in texts)
+    expected = ("multiplier", "hanging rest is stable", "inverted rest is stable", "this pendulum")
+    assert all(any(name in text for text in texts) for name in expected)
 
 
 @pytest.fixture(scope="module")
@@ -292,12 +265,6 @@ def test_added_frequencies_resolve_the_turns_of_curves(finer: xr.Dataset) -> Non
     assert omega[begins] - omega[begins - 1] < 1e-5
     assert np.ptp(rows[begins]) < 0.02
     assert rows[begins].mean() == pytest.approx(2.3, abs=0.1)
-    # Between any two frequencies the curves are straight within the resolution of a picture.
-    for k in range(begins + 1, omega.size - 1):
-        middle = (omega[k] + omega[k + 1]) / 2
-        exact = [q for q, m in found_at(DAMPED, middle, 3.0) if m < 0]
-        if rows[k].size == rows[k + 1].size == len(exact) and k % 7 == 0:
-            assert np.allclose((rows[k] + rows[k + 1]) / 2, exact, atol=0.01)
 
 
 def test_steep_strips_of_stability_are_shaded_between_frequencies_too() -> None:
@@ -337,12 +304,6 @@ def test_undamped_rest_is_unstable_from_no_drive_on_where_omega_is_2() -> None:
     assert "unstable from p = 0 on at omega = 2." in found.attrs["summary"]
     assert "soonest" not in found.attrs["summary"]
     assert found.attrs["title"] == "\N{GREEK SMALL LETTER GAMMA} = 0"
-
-
-def test_the_legend_names_the_pendulum_if_it_is_in_view() -> None:
-    for omega, shown in (([1.5, 2.5], True), ([6.0, 8.0], False)):
-        texts = named(made(pendmap.tongues(DAMPED, omega, 6.0)))
-        assert ("this pendulum" in texts) == shown
 
 
 @pytest.mark.parametrize(("low", "high"), [(0.70, 0.76), (1.0, 1.3)])

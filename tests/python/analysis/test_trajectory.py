@@ -37,7 +37,6 @@ def test_sections_are_taken_once_a_period() -> None:
 @pytest.mark.parametrize(
     ("pendulum", "velocity", "until"),
     [
-        (Pendulum(p=1.5, omega=0.3), 0.5, 60.0),
         (Pendulum(p=0, gamma=0.01), 30.0, 10.0),
         (Pendulum(p=0, gamma=0.1, torque=2.0), 0.0, 100.0),
         (Pendulum(p=1, omega=9.0), 9.0, 20.0),
@@ -74,7 +73,7 @@ def test_advance_counts_turns_as_a_trajectory_does() -> None:
     [
         ({"theta": math.nan}, "theta must be a finite number, got nan"),
         ({"velocity": math.inf}, "velocity must be a finite number, got inf"),
-        ({"until": 0}, "until must be a time above 0, got 0"),
+        ({"until": 0}, "until must be a time above 0 where t_eval is left out, got 0"),
         ({"until": math.inf}, "until must be a finite number, got inf"),
         ({"until": 1e12}, "do not fit"),
         ({"tol": 1.0}, "tol must be a number from 1e-13 to 1e-2, got 1"),
@@ -123,7 +122,6 @@ def watched(pendulum: Pendulum | Rig, until: float, **words: Any) -> tuple[Any, 
 @pytest.mark.parametrize(
     "pendulum",
     [
-        Pendulum(p=1.7, omega=0.87),
         Pendulum(p=1.5, omega=0.87, theta_r=0.2, phase=0.4),
         Pendulum(p=0.9, effects=(pendmap.Effect("drive_chirp", {"r": 1e-4}),), lab_time=3.0),
         Rig(w0=6.2, c_over_m=0.3, Tr=0.5, p=1.2, Omega=7.0),

@@ -262,7 +262,6 @@ def test_simulate(pendmap_command: Run, tmp_path: Path) -> None:
     expected = pendmap.simulate(pendmap.Pendulum(), math.pi / 2, 0, 30)
     assert result["theta"] == float(expected.theta[-1])
     assert result["tol_reached"] is True
-    assert 0 < result["exponent_from"] < result["exponent_to"] <= 30
     run = pendmap_command("simulate", "--until", 30)
     assert run.returncode == 0, run.stderr
     names = sorted(p.name for p in tmp_path.iterdir())
