@@ -94,9 +94,7 @@ def test_the_figure_names_its_attractors(diagram: xr.Dataset) -> None:
     assert "tumbling chaos" in texts
     assert [t.get_text() for t in figure.axes[1].get_yticklabels()] == ["up \u2192", "\u2190 down"]
     assert made(diagram, "velocity").axes[0].get_ylabel()
-    with pytest.raises(
-        pendmap.InputError, match=r"layer must be one of .* in a diagram, got 'labels'"
-    ):
+    with pytest.raises(pendmap.InputError, match=r"no layer 'labels'.*theta, sweeps, exponent"):
         made(diagram, "labels")
 
 

@@ -163,9 +163,7 @@ def test_the_figure_has_stripes_where_kinds_coexist(plane: xr.Dataset) -> None:
             assert set(said) <= seen
     for layer in ("exponent", "attractors", "period", "winding", "undecided", "share rest"):
         assert len(made(plane, layer).axes) == 2
-    with pytest.raises(
-        pendmap.InputError, match=r"layer must be one of this map: .*, got 'nothing'"
-    ):
+    with pytest.raises(pendmap.InputError, match=r"no layer 'nothing'.*kinds, exponent"):
         made(plane, "nothing")
 
 

@@ -179,7 +179,8 @@ def test_periods_without_drive_are_given_in_the_units_of_the_map(
     model: Rig | Pendulum, own: str, said: str
 ) -> None:
     result = pendmap.basins(model, Grid.square(8))
-    assert basins.unit(result, "settle") == f"periods of {own} to settle"
+    unit = basins.text_of(result, basins.LAYERS["settle"].unit)
+    assert unit == f"periods of {own} to settle"
     assert said in result.attrs["summary"]
     assert "forcing" not in result.settle_periods.attrs["long_name"]
 
