@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
+from numpy.polynomial import legendre
 
 from pendmap import _core
 from pendmap.analysis import grid, result
@@ -25,9 +26,8 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats
 
 
-_PHASES, _FINE = 32, 4096
-"""Numbers of drive phases at which the work is computed, enough for its harmonics up to the
-fifteenth, and at which its Fourier series is evaluated."""
+_PHASES, _FINE = 64, 4096
+"""Numbers of drive phases at which the work is computed, enough for its harmonics up to the 31st, and at which its Fourier series is evaluated."""
 _FASTEST = 14.0
 """Largest ratio of drive frequency to the orbit's rate at upright rest: above it the work is less
 than ``exp(-pi/2 14)`` of the power, which is rounding."""
@@ -38,8 +38,10 @@ _RESOLVED = 1e-9  # Work over the drive's absolute power above which it is not r
 _REACH, _SPACING = 42.0, 0.1
 """Largest time along the separatrix, and step: the trapezoidal rule has the error
 ``exp(-pi^2/spacing)`` for analytic integrands; friction's integrand falls only as ``exp(-|t|)``."""
-_NEAR = 1e-18  # Distance from upright rest at which the loop begins, rad
-_PANEL, _NODES = 0.5, 16  # Width of a panel of the loop's quadrature, and its Gauss nodes
+_NODES = 16  # Number of Gauss nodes on a panel of the loop
+_HALVED, _WIDTH, _END = 12, 0.5, 20.0
+"""Panels of the loop's parameter: halvings toward the turning point, near which a small torque
+leaves the other upright rest; width of further panels; end, where the angle is rounding."""
 
 
 SCHEMA = Schema(
@@ -275,45 +277,65 @@ def separatrix() -> Orbit:
 def loop(torque: float) -> Orbit:
     """Return the orbit that leaves upright rest ``pi - asin(torque)`` and comes back to it.
 
-    The distance ``u`` from there grows from a tiny one, ``u'' = c sin u - torque (1 - cos u)``,
-    ``c = sqrt(1 - torque^2)``, until the orbit turns; the way back is the mirror image in time.
+    At a distance ``u`` from there ``th'^2 / 2 = G(u) = c (1 - cos u) - torque (u - sin u)``, ``c =
+    sqrt(1 - torque^2)``, up to its zero ``u_t``, where the orbit turns. With ``u = u_t /
+    cosh(y)^2`` time is ``dt / dy = 2 / sqrt(2 h)``, ``h = G / (u tanh y)^2``, which is smooth and
+    positive from the turning point, ``y = 0``, on to upright rest.
     """
-    from scipy.integrate import solve_ivp  # noqa: PLC0415 (heavy; only a torque needs it)
-
     if torque < 0:
         return loop(-torque).mirrored()
     c = math.sqrt((1 - torque) * (1 + torque))
-    rate = math.sqrt(c)
-
-    def slope(_: float, state: Floats) -> list[float]:
-        return [state[1], c * math.sin(state[0]) - 2 * torque * math.sin(state[0] / 2) ** 2]
-
-    def turns(_: float, state: Floats) -> float:
-        return float(state[1])
-
-    turns.terminal, turns.direction = True, -1  # type: ignore[attr-defined]
-    run = solve_ivp(
-        slope,
-        (0.0, 1e3 / rate),
-        [_NEAR, rate * _NEAR],
-        "DOP853",
-        dense_output=True,
-        events=turns,
-        rtol=1e-13,
-        atol=1e-30,
-        max_step=_SPACING / rate,
+    turn = _turning_point(torque, c)
+    ends = np.concatenate(
+        [[0.0], 0.5 ** np.arange(_HALVED, 1, -1), np.arange(_WIDTH, _END + _WIDTH / 2, _WIDTH)]
     )
-    x, weight = np.polynomial.legendre.leggauss(_NODES)
-    half = _PANEL / rate / 2
-    ends = -np.arange(2 * half, run.t[-1], 2 * half)[::-1]
-    time = (ends[:, None] + half * (1 + x)).ravel()  # before the turn
-    u, speed = run.sol(run.t[-1] + time)
-    theta = math.atan2(torque, -c) - u
+    x, weight = legendre.leggauss(_NODES)
+    half = np.diff(ends)[:, None] / 2
+    y = ends[:-1, None] + half * (1 + x)
+    u, beyond = turn / np.cosh(y) ** 2, turn * np.tanh(y) ** 2
+    # G is expanded about its nearer zero, u = 0 or the turning point.
+    middle = turn - beyond / 2
+    from_rest = 2 * c * np.sin(u / 2) ** 2 - torque * _less_sine(u)
+    from_turn = torque * (
+        2 * _less_sine(beyond / 2) + 4 * np.sin(beyond / 2) * np.sin(middle / 2) ** 2
+    ) - 2 * c * np.sin(beyond / 2) * np.sin(middle)
+    energy = np.where(u < beyond, from_rest, from_turn)
+    rate = 2 * u * np.tanh(y) / np.sqrt(2 * energy)
+    whole = (half * rate) @ weight
+    time = (np.cumsum(whole) - whole)[:, None] + half * rate @ _integrals(x).T
+    time, theta = time.ravel(), (math.atan2(torque, -c) - u).ravel()
+    speed, weights = np.sqrt(2 * energy).ravel(), (half * rate * weight).ravel()
     return Orbit(
-        np.concatenate([time, -time]),
+        np.concatenate([-time, time]),
         np.tile(theta, 2),
         np.concatenate([-speed, speed]),
-        np.tile(half * weight, 2 * ends.size),
+        np.tile(weights, 2),
         torque,
-        rate,
+        math.sqrt(c),
     )
+
+
+def _turning_point(torque: float, c: float) -> float:
+    """Return the distance from upright rest at which the loop turns."""
+    from scipy.optimize import brentq  # noqa: PLC0415 (heavy; only a torque needs it)
+
+    def energy(u: float) -> float:
+        return 2 * c * math.sin(u / 2) ** 2 - torque * float(_less_sine(np.array(u)))
+
+    # Beyond the bottom of the well, where G is greatest, it falls.
+    return float(brentq(energy, 2 * math.atan2(c, torque), math.tau, xtol=1e-300))
+
+
+def _less_sine(x: Floats) -> Floats:
+    """Return ``x - sin x`` without loss of digits where ``x`` is small."""
+    square = x * x
+    series = x * square / 6 * (1 - square / 20 * (1 - square / 42 * (1 - square / 72)))
+    return np.where(x < 0.1, series, x - np.sin(x))  # noqa: PLR2004 (the series errs by 1e-15)
+
+
+def _integrals(x: Floats) -> Floats:
+    """Return the matrix from values at Gauss nodes to integrals from -1 to each node."""
+    p = legendre.legvander(x, x.size)
+    k = np.arange(1, x.size)
+    of_each = np.concatenate([p[:, :1] + p[:, 1:2], (p[:, 2:] - p[:, :-2]) / (2 * k + 1)], axis=1)
+    return np.asarray(of_each @ np.linalg.inv(p[:, :-1]))

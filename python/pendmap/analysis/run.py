@@ -163,13 +163,15 @@ class RunOptions:
         if self.store is None:
             return compute(Work(job, Store(), self.executor, self.progress))
         store = FileStore(_address(self.store))
-        with store.held(), reached(store.address):
-            result = store.begin(_request(name, model, arguments), resume=self.resume)
+        with store.held():
+            with reached(store.address):
+                result = store.begin(_request(name, model, arguments), resume=self.resume)
             if result is None:
                 work = Work(job, store, self.executor, self.progress)
                 with work.named(store.unfinished):
                     result = compute(work)
-                    store.complete(result)
+                    with reached(store.address):
+                        store.complete(result)
         return result
 
 

@@ -52,8 +52,9 @@ def analysis_command(
     def make(prepare: Callable[..., dict[str, Any]]) -> click.Command:
         def run(**given: Any) -> None:  # noqa: ANN401 (the options)
             resume = given.pop("resume", False)
-            names = [key for key in ("threads", "seed") if key in given]
-            run_options: dict[str, Any] = {key: given.pop(key) for key in names}
+            chosen: dict[str, Any] = {
+                key: given.pop(key) for key in ("threads", "seed") if key in given
+            }
             pendulum, outputs = begin(given, name, going_on=resume)
             arguments = prepare(pendulum, outputs, **given)
             module = importlib.import_module(f"pendmap.analysis.{kind}")
@@ -64,8 +65,8 @@ def analysis_command(
                 if runs:
                     from pendmap.analysis.run import RunOptions
 
-                    run_options |= {"progress": progress, "store": store, "resume": resume}
-                    arguments["run"] = RunOptions(**run_options)
+                    chosen |= {"progress": progress, "store": store, "resume": resume}
+                    arguments["run"] = RunOptions(**chosen)
                 dataset = getattr(module, function)(pendulum, **arguments)
             if store is None:
                 show(dataset, outputs, module.SCHEMA)

@@ -149,7 +149,8 @@ class FileStore(Store):
 
     def get(self, name: str) -> Any:
         """Return the bytes of a record; None if there is none, or a kill or damage has cut it."""
-        data = self.records.get(name, b"")
+        with dataset.reached(self.address):
+            data = self.records.get(name, b"")
         content = data[_CHECK:]
         return content if hashlib.sha256(content).digest() == data[:_CHECK] else None
 
@@ -162,7 +163,13 @@ class FileStore(Store):
             stream = io.BytesIO()
             np.savez(stream, **record)
             record = stream.getvalue()
-        self.records[name] = hashlib.sha256(record).digest() + record
+        with dataset.reached(self.address):
+            self.records[name] = hashlib.sha256(record).digest() + record
+
+    def done(self, step: str) -> set[int]:
+        """Return the tiles of a step whose record is there."""
+        with dataset.reached(self.address):
+            return super().done(step)
 
     def complete(self, result: xr.Dataset) -> None:
         """Write the result, and remove the records."""
