@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 
 
 _PHASES, _FINE = 64, 4096
-"""Numbers of drive phases at which the work is computed, enough for its harmonics up to the 31st, and at which its Fourier series is evaluated."""
+"""Numbers of drive phases at which the work is computed, enough for its harmonics up to the 31st,
+and at which its Fourier series is evaluated."""
 _FASTEST = 14.0
 """Largest ratio of drive frequency to the orbit's rate at upright rest: above it the work is less
 than ``exp(-pi/2 14)`` of the power, which is rounding."""
