@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from pendmap.analysis.sweeps.report import varied_names
+from pendmap.analysis.sweep_table import varied_names
 from pendmap.charts import basin_sweep
 from pendmap.charts.marks import Level
 from pendmap.viewer import marks

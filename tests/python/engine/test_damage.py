@@ -53,7 +53,7 @@ DAMAGES = (deleted, emptied, truncated, flipped)
 
 @pytest.fixture(autouse=True)
 def _tiny_tiles(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pendmap.analysis.basins.TILE", 100)
+    monkeypatch.setattr("pendmap.analysis.basin_tiles.TILE", 100)
 
 
 def same_or_refused(call: Callable[[], xr.Dataset], truth: xr.Dataset) -> bool:

@@ -92,7 +92,7 @@ def test_a_full_disk_keeps_what_is_done(
         pendmap.load(store)
     if name == "basins":
         with monkeypatch.context() as patch:
-            patch.setattr("pendmap.analysis.basins.TILE", 2 * tiled.TILE)
+            patch.setattr("pendmap.analysis.basin_tiles.TILE", 2 * tiled.TILE)
             with pytest.raises(pendmap.InputError, match="was begun with tiles of"):
                 tiled.case(name, store=store, resume=True)
     tiled.assert_same(tiled.case(name, store=store, resume=True), tiled.plain(name))

@@ -288,7 +288,7 @@ def test_a_selection_that_cannot_be_drawn_is_refused_in_one_line(tmp_path: Path)
 def test_a_selection_states_that_its_summary_is_of_the_whole(tmp_path: Path) -> None:
     part = MAP.isel(theta=slice(0, 4))
     assert part.attrs["summary"].startswith(
-        "theta = -3.14159 to 3.14159 rad, velocity = -3 to 3 (the default window): 81 starts."
+        "theta = -3.14159 to 3.14159 rad, velocity = -3 to 3: 81 starts."
     )
     told = recorded(part, tmp_path).one("/summary", "TextDocument:text")
     assert "A part is shown: theta = -3.14159 to -0.349066, velocity = -3 to 3, 36 cells of 81" in (
