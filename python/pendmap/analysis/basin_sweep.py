@@ -15,7 +15,7 @@ from pendmap.analysis.grid import Grid
 from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.result import Field, Found, Schema
 from pendmap.analysis.run import RunOptions
-from pendmap.analysis.summary import bound_said, undecided
+from pendmap.analysis.summary import bound_said, cost, undecided
 from pendmap.analysis.sweep_tiles import PLANES, SweepTiles, branches
 from pendmap.engine import Layout
 from pendmap.files import facts
@@ -204,6 +204,4 @@ def _summary(dataset: xr.Dataset) -> list[str]:
             "LABELS OF SINGLE CELLS ARE NOT RELIABLE IN SOME MAPS (half the step or mirroring "
             f"changes up to {percent(100 * changed)}): read the shares."
         )
-    lines += undecided(a, ending="_share")
-    cost = f"{a['seconds']:.1f} s on {counted(a['threads'], 'thread')}"
-    return [*lines, f"Error after 5 periods up to {a['reached_error']:.2g}; {cost}."]
+    return [*lines, *undecided(a, ending="_share"), f"Largest {cost(a)}"]

@@ -43,6 +43,7 @@ _CELLS: Final = {"label": "int16", "settle_periods": "int32", "net_turns": "int3
 _EXPONENT: Final = {"finite_time_exponent": "float32"}
 _FOLDER: Final = "work/"  # Beginning of the names of cells that are not the last ones
 _NOTHING: Final = np.zeros(0, np.int64)
+_NO_STATES: Final = np.zeros(0)
 _BYTES: Final = 32  # Memory of a start during the computation
 _NOT_CHECKED: Final = SimpleNamespace(
     unreliable=0.0, unreliable_half_step=0.0, unreliable_mirror=None, labels_sampled=0
@@ -70,10 +71,9 @@ class Starts:
     """The starts of a map: a grid by its axes, or a list of states; without dimensions."""
 
     def __init__(
-        self, axes: Axes | None, theta: Floats | None = None, velocity: Floats | None = None
+        self, axes: Axes | None, theta: Floats = _NO_STATES, velocity: Floats = _NO_STATES
     ) -> None:
-        self.axes = axes
-        self.theta, self.velocity = np.asarray(theta), np.asarray(velocity)
+        self.axes, self.theta, self.velocity = axes, theta, velocity
         self.shape = self.theta.shape if axes is None else (axes[1][2], axes[0][2])
         self.dims = ("start",) if axes is None else ("velocity", "theta")
         self.row = math.prod(self.shape[1:])

@@ -20,7 +20,7 @@ from pendmap.analysis import result, varied
 from pendmap.analysis.grid import Grid
 from pendmap.analysis.orbit_table import DESCRIBED, described
 from pendmap.analysis.result import Field, Found
-from pendmap.analysis.summary import undecided, window_said
+from pendmap.analysis.summary import cost, undecided, window_said
 from pendmap.engine import Tile
 from pendmap.errors import MOST_CELLS, check_type, check_whole, core_errors
 from pendmap.files import facts
@@ -151,11 +151,8 @@ class CellSearch:
             lines.append(
                 f"Chaos: not captured within {periods}; a longer transient looks the same."
             )
-        lines += undecided(a, ending="_share")
         window = window_said(box.theta.as_tuple, box.velocity.as_tuple, Units.of(a))
-        cost = f"{a['seconds']:.1f} s on {counted(a['threads'], 'thread')}"
-        error = f"error after 5 periods {a['reached_error']:.2g}"
-        return [*lines, f"The box is {window}; {error}; {cost}."]
+        return [*lines, *undecided(a, ending="_share"), f"The box is {window}; {cost(a)}"]
 
 
 def variables(

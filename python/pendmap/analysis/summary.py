@@ -74,11 +74,13 @@ def undecided(a: Mapping[Any, Any], bound: str = "", ending: str = "") -> list[s
 
 def effort(a: Mapping[Any, Any]) -> str:
     """Return a summary line on how a result was computed: steps, error, time."""
-    return (
-        f"{counted(a['steps_per_period'], 'step')} a period, error reached "
-        f"{a['reached_error']:.1e}, {a['seconds']:.2f} s on {counted(a['threads'], 'thread')} "
-        f"({a['simd']})."
-    )
+    return f"{counted(a['steps_per_period'], 'step')} a period, {cost(a)}"
+
+
+def cost(a: Mapping[Any, Any]) -> str:
+    """Return the error and the time of a result as text."""
+    time = f"{a['seconds']:.2f} s on {counted(a['threads'], 'thread')} ({a['simd']})"
+    return f"error reached {a['reached_error']:.1e}, {time}."
 
 
 def unlimited_rotation(pendulum: Pendulum) -> list[str]:

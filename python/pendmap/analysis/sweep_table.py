@@ -116,14 +116,14 @@ def _table(
     alone, there = "number of the attractor", exists.sum(axis=-1, dtype=np.int32)
     image = "its own number where symmetric, 0 if not known"
     first = {k: place for place, k, _ in reversed(every)}
-    own = _names([one.name for one in most], [first[k] for k in range(count)], axes)
+    unique = _names([one.name for one in most], [first[k] for k in range(count)], axes)
     of_models = {
         f"point_{axis.name}": ("point", axis.values[at.astype(int)], axis.attributes)
         for axis, at in zip(axes, places, strict=True)
     }
     return {
         "attractor": variable(
-            "attractor", np.array(own, dtype=str), long_name="name of the attractor"
+            "attractor", np.array(unique, dtype=str), long_name="name of the attractor"
         ),
         "id": variable("attractor", np.arange(1, count + 1, dtype=np.int32), "1", alone),
         "twin": variable("attractor", twin, "1", "number of the mirror image", image),
@@ -178,8 +178,8 @@ def attractors(dataset: xr.Dataset) -> list[dict[str, Any]]:
 
 def maps_of(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the maps for JSON, each with its attractors."""
-    own = ("fraction", "stderr", "exponent", "exponent_stderr", "theta_point", "velocity_point")
-    data = {name: dataset[name].values for name in (*_EVERY, "kind", "n", "w", *own, "ci95")}
+    reals = ("fraction", "stderr", "exponent", "exponent_stderr", "theta_point", "velocity_point")
+    data = {name: dataset[name].values for name in (*_EVERY, "kind", "n", "w", *reals, "ci95")}
     maps = []
     for place in np.ndindex(dataset["plane"].shape):
         at = zip(varied_names(dataset), place, strict=True)
@@ -190,7 +190,7 @@ def maps_of(dataset: xr.Dataset) -> list[dict[str, Any]]:
         for k in np.flatnonzero(dataset["exists"].values[place]).tolist():
             kind, n, w = (int(data[name][place][k]) for name in ("kind", "n", "w"))
             names = {"id": k + 1, "kind": KINDS[kind], "n": n or None, "w": w if n else None}
-            values = {name: _number(data[name][place][k].item()) for name in own}
+            values = {name: _number(data[name][place][k].item()) for name in reals}
             attractors.append(names | values | {"ci95": data["ci95"][place][k].tolist()})
         maps.append(one)
     return maps

@@ -215,14 +215,14 @@ class SweepTiles:
             with contextlib.suppress(InputError):  # there is no boundary
                 law = uncertainty_exponent(label.reshape(self.cells))
                 measures |= {LAW[0]: law.value, LAW[1]: law.stderr}
-        found = [
+        listed = [
             Found(
                 *(a.kind, a.n or 0, a.w, a.lean, a.turn, k, a.twin or 0),
                 *(a.exponent, a.exponent_stderr, a.fraction, _spread(a.points, a.n)),
             )
             for k, a in enumerate(attractors, 1)
         ]
-        return label, Mapped(measures, found)
+        return label, Mapped(measures, listed)
 
     def run(self, work: Work) -> dict[Place, Mapped]:
         """Compute the blocks that are missing; return the maps of all by their places."""
@@ -230,8 +230,8 @@ class SweepTiles:
         maps: dict[Place, Mapped] = {}
         for tile, record in work.each(_STEP, _STATE, range(math.prod(self.blocks))):
             read = json.loads(unpack(record)["maps"].tobytes())
-            for place, (measures, found) in zip(self.places(tile), read, strict=True):
-                maps[place] = Mapped(measures, [Found(*one) for one in found])
+            for place, (measures, attractors) in zip(self.places(tile), read, strict=True):
+                maps[place] = Mapped(measures, [Found(*one) for one in attractors])
         return {place: maps[place] for place in np.ndindex(*self.shape)}
 
     def labels(self, store: Store, numbers: Numbers, row: int) -> NDArray[np.int16]:

@@ -299,10 +299,10 @@ def _one(model: Pendulum | Rig, name: str, values: Floats) -> Varied:
             raise InputError(
                 f"{name} changes the units of others: the model must be one without dimensions"
             )
-        own = effects[which].parameters
+        old = effects[which].parameters
         one = dataclasses.replace(effects[which], ci95={})
         changed = [
-            dataclasses.replace(one, parameters={**own, parameter: float(x)}) for x in values
+            dataclasses.replace(one, parameters={**old, parameter: float(x)}) for x in values
         ]
         plain = np.array([effect.bare(units).parameters[parameter] for effect in changed])
         unit = definition[parameter].unit if units.si else ""
@@ -374,6 +374,6 @@ def with_values(model: Pendulum | Rig, values: Mapping[str, float]) -> Pendulum 
     numbers: dict[str, Any] = {name: x for name, x in values.items() if name in model.numbers()}
     effects = []
     for one in model.effects:
-        own = {name: values.get(f"{one.name}.{name}", x) for name, x in one.parameters.items()}
-        effects.append(dataclasses.replace(one, parameters=own, ci95={}))
+        changed = {name: values.get(f"{one.name}.{name}", x) for name, x in one.parameters.items()}
+        effects.append(dataclasses.replace(one, parameters=changed, ci95={}))
     return dataclasses.replace(model, **numbers, effects=tuple(effects))
