@@ -21,7 +21,7 @@ from pendmap.engine import Layout, Tile, pack, unpack
 from pendmap.errors import core_errors
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from numpy.typing import NDArray
 
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     Axes = tuple[tuple[float, float, int], tuple[float, float, int]]
     Labels = NDArray[np.int16]
     Cells = dict[str, NDArray[Any]]
+    Progress = Callable[[int, int], object]
 
 TILE: Final = 2**20
 """Largest number of starts of a tile: 0.3 CPU seconds of a smooth map, 5 of a chaotic one."""
@@ -104,7 +105,9 @@ class BasinTiles:
     def _layout(self) -> Layout:
         return Layout(self.starts.dims, self.starts.shape, self.starts.height, {})
 
-    def _plan(self, state: bytes | None = None, progress: Any = None) -> _core.BasinPlan:  # noqa: ANN401
+    def _plan(
+        self, state: bytes | None = None, progress: Progress | None = None
+    ) -> _core.BasinPlan:
         """Return the plan of a record for all starts, or search for attractors."""
         starts = self.starts.of_rows(slice(None))
         with core_errors():

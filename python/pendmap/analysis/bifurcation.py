@@ -32,8 +32,7 @@ if TYPE_CHECKING:
     from pendmap.units import Units
 
 
-_NEAR = 0.3
-"""Distance, rad and units of velocity, below which neighbouring attractors may be one branch."""
+_NEAR = 0.3  # Distance, rad and units of velocity, below which neighbours may be one branch
 _LISTED = 12  # Largest number of branches in a summary
 
 

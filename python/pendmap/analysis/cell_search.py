@@ -46,10 +46,8 @@ if TYPE_CHECKING:
 
 UNDECIDED: Final = "undecided"  # Kind of a cell in which no attractor was found
 _SPREAD: Final = 1000  # Cells on each side of the default box, without effect
-_PLASTIC: Final = 1.324717957244746
-"""Plastic number, whose powers give an even additive recurrence in two dimensions."""
-_CELLS: Final = 61
-"""Cells after which initial conditions repeat: a prime, so that columns differ too."""
+_PLASTIC: Final = 1.324717957244746  # Its powers give an even additive recurrence in the plane
+_CELLS: Final = 61  # Cells after which starts repeat: a prime, so that columns differ too
 _STEP: Final = "search-"  # Beginning of the names of steps
 _GAINED: Final = {False: b"-", True: b"+"}
 """First byte of a record: whether a cell has gained an attractor; alone if nothing changed."""

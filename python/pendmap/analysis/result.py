@@ -195,15 +195,15 @@ def point(
     }
 
 
-def labels(dims: tuple[str, ...], values: Any, names: Iterable[str]) -> tuple[Any, ...]:  # noqa: ANN401
+def labels(
+    dims: tuple[str, ...],
+    values: Any,  # noqa: ANN401 (an array)
+    names: Iterable[str],
+) -> tuple[Any, ...]:
     """Return the attractor of each start as a variable; ``names`` are those of the attractors."""
-    return variable(
-        dims,
-        values,
-        long_name="attractor",
-        comment="number of the attractor; 0 undecided within the bound, -1 failed or diverged",
-        flags=dict(enumerate(["failed", "undecided", *names], -1)),
-    )
+    comment = "number of the attractor; 0 undecided within the bound, -1 failed or diverged"
+    flags = dict(enumerate(["failed", "undecided", *names], -1))
+    return variable(dims, values, long_name="attractor", comment=comment, flags=flags)
 
 
 def records(dataset: xr.Dataset, **variables: str) -> list[dict[str, Any]]:

@@ -59,8 +59,7 @@ _SIDES: Final = {1: (16,), 2: (8, 8)}
 _POINTS: Final = 128  # Largest number of points of an attractor that are kept
 PLANES: Final = ("basins", "only_chaos", "conservative")
 _SAME: Final = 1e-6  # Distance within which two orbits of the integration steps are one
-_LIKE: Final = 0.25
-"""Largest mean distance between the points of two sets that follow one another."""
+_LIKE: Final = 0.25  # Largest mean distance between points of sets that follow one another
 _ALONE: Final = ("tumbling_chaos", "quasiperiodic_rotation", "rotation")
 """Kinds that a model has at most once in each sense unless Newton's method finds them."""
 _HALVED: Final = 4  # Number of times that a step of the parameters is halved
