@@ -1,8 +1,7 @@
-"""What a store, workers and tiles cost, over the plain command; peak memory of large maps.
+"""What a store costs over the plain command; peak memory of large maps.
 
-Pairs of commands alternate; the ratio of their times is the median of the pairs. Two workers are
-processes of one thread each. ``--large SIDE`` maps SIDE x SIDE cells into a store and tells the
-peak memory of the command.
+Pairs of commands alternate; the ratio of their times is the median of the pairs. ``--large SIDE``
+maps SIDE x SIDE cells into a store and tells the peak memory of the command.
 """
 
 from __future__ import annotations
@@ -67,15 +66,9 @@ def main() -> None:
         for p in given.p:
             plain = ["basins", "--p", p, "--grid", str(given.side)]
             nc, zarr = [*plain, "--out", "m.nc"], [*plain, "--out", "m.zarr"]
-            alone, both = [*zarr, "--workers", "1"], [*zarr, "--workers", "2"]
-            for what, one, other in (
-                ("store / file", nc, zarr),
-                ("store and two workers / file", nc, both),
-                ("two workers / one", alone, both),
-            ):
-                rows.append([p, f"{given.side}^2", what, *pairs(folder, given.pairs, one, other)])
-    say(machine(["numpy", "zarr", "distributed"]))
-    say(table(["p", "cells", "ratio of", "wall", "CPU", "MiB", "MiB"], rows))
+            rows.append([p, f"{given.side}^2", *pairs(folder, given.pairs, nc, zarr)])
+    say(machine(["numpy", "zarr"]))
+    say(table(["p", "cells", "wall, store / file", "CPU", "MiB of the file", "of the store"], rows))
 
 
 if __name__ == "__main__":

@@ -24,7 +24,8 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from benchmarks.peers.report import machine, note, say, table
-from pendmap.identification.methods.trajectory import identify
+from pendmap.identification.methods.trajectory import fit_together, identification_of, physical
+from pendmap.records import Run
 
 NAMES = ("w0", "c_over_m", "Tr", "offset")
 HEADERS = ("parameter", "cover %", "95 % of that", "wanted", "rms / bound", "wanted", "median z^2")
@@ -151,7 +152,6 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=2000, help="decays")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--known-sigma", action="store_true", help="tell the fit the noise")
     given = parser.parse_args()
     say(f"Intervals of the trajectory method, {given.count} decays, seed {given.seed}")
     say(machine(("pendmap", "numpy", "scipy")))
@@ -162,8 +162,8 @@ def main() -> None:
         batches = chain.from_iterable(pool.map(prepared, requests))
         for k, (case, readings, limit) in enumerate(batches):
             start = time.perf_counter()
-            sigma = case.sigma if given.known_sigma else None
-            found = identify(TIMES, readings, sigma=sigma)
+            run = Run("", "", "free", TIMES, readings, np.ones(TIMES.size, bool))
+            found = identification_of(physical(fit_together([run])))
             taken.append(time.perf_counter() - start)
             values = np.array([found[name] for name in NAMES])
             ends = [found.estimates[name].ci95 or (math.nan, math.nan) for name in NAMES]

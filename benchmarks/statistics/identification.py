@@ -22,9 +22,8 @@ os.environ.update(dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"
 import numpy as np
 
 from benchmarks.peers.report import machine, note, say, table
-from pendmap.identification import Estimate, Identification, Peaks, find_peaks
-from pendmap.identification.methods import combined, de_paula, log_decrement
-from pendmap.identification.methods.registry import identify_record
+from pendmap.identification import Estimate, Identification, Peaks, find_peaks, identify
+from pendmap.identification.methods import combined, lines
 from pendmap.identification.period import mean_period
 from pendmap.identification.table1 import State, peak_errors
 from pendmap.virtual_rig.effects.base import Drive
@@ -120,14 +119,13 @@ def choices(peaks: Peaks) -> dict[str, Identification]:
                 some, reading=reading
             )
         for cut in (12.0, 30.0, 90.0, 180.0):
-            for reading in ("ends", "line"):
-                name = f"log_decrement, {reading}, {floor:g} to {cut:g} deg"
-                made[name] = log_decrement.from_peaks(some, reading=reading, cut=math.radians(cut))
+            name = f"log_decrement, {floor:g} to {cut:g} deg"
+            made[name] = lines.log_decrement(some, cut=math.radians(cut))
         for cut in (6.0, 12.0, 30.0, 60.0):
             for top in (90.0, 180.0):
                 slow, fast = np.radians((floor, cut)), np.radians((cut, top))
                 name = f"de_paula, fast {cut:g} to {top:g}, slow {floor:g} to {cut:g} deg"
-                made[name] = de_paula.from_peaks(some, fast=tuple(fast), slow=tuple(slow))
+                made[name] = lines.de_paula(some, fast=tuple(fast), slow=tuple(slow))
     return {name: each for name, each in made.items() if each.applicable}
 
 
@@ -230,7 +228,7 @@ def against_truth(path: Motion, count: int) -> None:
         times, angles = record(path, seed, OFFSET)
         start = State(0.0, float(find_peaks(times, angles).amplitude[0]))
         begin = time.perf_counter()
-        everything = identify_record(times, angles)
+        everything = identify(times, angles).methods
         seconds.append(time.perf_counter() - begin)
         for name, each in everything.items():
             if not each.applicable:
@@ -279,7 +277,7 @@ def spoilers(path: Motion, count: int) -> None:
             for seed in range(count if noise else 1):
                 times, angles = record(path, seed, offset, sensor)
                 start = State(0.0, float(find_peaks(times, angles).amplitude[0]))
-                found = identify_record(times, angles, methods=[name])[name]
+                found = identify(times, angles, methods=[name]).methods[name]
                 if found.applicable:
                     made.append(misses(found, truth, start)[0])
             cells.append(f"{np.median(made):.2e}" if made else "-")

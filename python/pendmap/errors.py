@@ -83,8 +83,7 @@ MOST_DRAWS: Final = 10_000
 MOST_PERIODS: Final = 2**31 - 1
 MOST_SAMPLES: Final = 10_000
 MOST_SEED: Final = 2**63 - 1
-MOST_THREADS: Final = 256
-MOST_WORKERS: Final = 10_000  # Largest allowed values of arguments
+MOST_THREADS: Final = 256  # Largest allowed values of arguments
 
 _LONGEST: Final = 60  # Largest length of a value in a message, characters
 

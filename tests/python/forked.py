@@ -104,7 +104,7 @@ def jobs(folder: Path) -> dict[str, Callable[[], object]]:
         "save": lambda: pendmap.save(basins, folder / "again.nc"),
         "save_model": lambda: pendmap.save_model(model, folder / "again.toml"),
         "simulate": lambda: pendmap.simulate(pendulum, 1.0, 0.0, 20.0, lyapunov=True),
-        "table1": lambda: identification.table1(time, theta, methods),
+        "table1": lambda: identification.table1(identification.find_peaks(time, theta), methods),
         "tongues": lambda: pendmap.tongues(pendulum, [1.0, 2.0]),
         "uncertainty_exponent": lambda: pendmap.uncertainty_exponent(halves),
         "draw": lambda: render.draw(basins, folder / "basins.png"),

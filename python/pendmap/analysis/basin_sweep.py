@@ -17,7 +17,6 @@ from pendmap.analysis.result import Field, Found, Schema
 from pendmap.analysis.run import RunOptions
 from pendmap.analysis.summary import bound_said, cost, undecided
 from pendmap.analysis.sweep_tiles import PLANES, SweepTiles, branches
-from pendmap.engine import Layout
 from pendmap.files import facts
 from pendmap.formatting import counted, percent, span
 from pendmap.model import without_dimensions
@@ -147,19 +146,12 @@ def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     blocks, models = math.prod(job.blocks), math.prod(job.shape)
     threads, at_once = run.tiles(blocks)
     job = dataclasses.replace(job, threads=threads, at_once=at_once)
-    if run.store is None:
-        _core.reckon("starts", models * grid.cells, _BYTES)
+    _core.reckon("starts", models * grid.cells, _BYTES)
 
-    def compute(work: Work) -> tuple[xr.Dataset, list[str]]:
-        dims = (*(axis.name for axis in axes), "velocity", "theta")
-        shape = (*job.shape, grid.velocity.count, grid.theta.count)
-        layout = Layout(dims, shape, min(job.side[0], job.shape[0]), {"label": "int16"})
-        work.store.create(layout)
+    def compute(work: Work) -> xr.Dataset:
         maps = job.run(work)
         numbers = branches(job, maps)
-        for tile in range(layout.tiles):
-            work.store.write(tile, {"label": job.labels(work.store, numbers, tile)})
-        label = work.store.whole("label")
+        label = job.labels(work.store, numbers)
         dataset = table.sweep_dataset(maps, numbers, axes, grid, units, label)
         values = {
             **numerics.provenance(),
@@ -175,7 +167,7 @@ def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         varied.complete(
             *(SCHEMA, dataset, pendulum, axes, values), summary=_summary, what="basins are"
         )
-        return dataset, ["label"]
+        return dataset
 
     request = {"ranges": [axis.request for axis in axes], **numerics.request}
     request |= {"grid": grid, "layer_periods": layer_periods, "check": check}

@@ -17,11 +17,11 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap import _core
-from pendmap.engine import Layout, Tile, pack, unpack
+from pendmap.engine import pack, unpack
 from pendmap.errors import core_errors
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable
 
     from numpy.typing import NDArray
 
@@ -40,9 +40,7 @@ _LEAST_TILE: Final = 2**18
 _TILES: Final = 64  # Least number of tiles of a map of larger ones: workers end together
 _BOX: Final = 5  # Tiles begin with a row of boxes of the basin entropy
 _SAMPLE: Final = 256  # Largest number of undecided starts from which a further search begins
-_CELLS: Final = {"label": "int16", "settle_periods": "int32", "net_turns": "int32"}
-_EXPONENT: Final = {"finite_time_exponent": "float32"}
-_FOLDER: Final = "work/"  # Beginning of the names of cells that are not the last ones
+_CELLS: Final[tuple[str, ...]] = ("label", "settle_periods", "net_turns")
 _NOTHING: Final = np.zeros(0, np.int64)
 _NO_STATES: Final = np.zeros(0)
 _BYTES: Final = 32  # Memory of a start during the computation
@@ -75,7 +73,7 @@ class Starts:
         self, axes: Axes | None, theta: Floats = _NO_STATES, velocity: Floats = _NO_STATES
     ) -> None:
         self.axes, self.theta, self.velocity = axes, theta, velocity
-        self.shape = self.theta.shape if axes is None else (axes[1][2], axes[0][2])
+        self.shape: tuple[int, ...] = self.theta.shape if axes is None else (axes[1][2], axes[0][2])
         self.dims = ("start",) if axes is None else ("velocity", "theta")
         self.row = math.prod(self.shape[1:])
         """Number of starts in a row."""
@@ -97,13 +95,17 @@ class BasinTiles:
     choices: _core._Choices
     rate: float = 1.0  # Exponents of the model for one without dimensions
     threads: int = 1  # Threads of a tile; the search and the checks have those of the choices
-    part_of_result: bool = True
-    """Whether the labels are cells of the result, not what another analysis is made from."""
     at_once: int = 1  # Number of tiles that this process computes at once
 
     @property
-    def _layout(self) -> Layout:
-        return Layout(self.starts.dims, self.starts.shape, self.starts.height, {})
+    def tiles(self) -> int:
+        """Number of tiles."""
+        return -(-self.starts.shape[0] // self.starts.height)
+
+    def rows(self, tile: int) -> slice:
+        """Return the rows of a tile."""
+        height = self.starts.height
+        return slice(tile * height, min((tile + 1) * height, self.starts.shape[0]))
 
     def _plan(
         self, state: bytes | None = None, progress: Progress | None = None
@@ -128,9 +130,9 @@ class BasinTiles:
         tile: int,
         inputs: Indices | None,
         progress: Any = None,  # noqa: ANN401
-    ) -> Tile:
+    ) -> Cells:
         """Label the starts of a tile, or its undecided ones again."""
-        rows = self._layout.rows(tile)
+        rows = self.rows(tile)
         choices: _core._Choices = {**self.choices, "threads": self.threads}
         with core_errors():
             starts = self.starts.of_rows(rows)
@@ -144,22 +146,21 @@ class BasinTiles:
         arrays = labelled.label, labelled.settle, labelled.turns
         cells: Cells = dict(zip(_CELLS, arrays, strict=True))
         if inputs is not None:
-            return Tile(pack(picks=inputs, work=labelled.work, **cells))
+            return pack(picks=inputs, work=labelled.work, **cells)
         if labelled.finite_time_exponent is not None:
             exponent = labelled.finite_time_exponent * np.float32(self.rate)
             cells["finite_time_exponent"] = exponent
         undecided = np.count_nonzero(labelled.label == 0)
-        return Tile(pack(work=labelled.work, undecided=undecided), _named(cells))
+        return pack(work=labelled.work, undecided=undecided, **cells)
 
     def _undecided(self, store: Store, again: int, tile: int) -> Indices:
         """Return the indices of the starts of a tile that are labelled in a step ``again``."""
-        rows = self._layout.rows(tile)
         if again == 1:
-            labels = store.read(f"{_FOLDER}label", rows).reshape(-1)
-            picks: Indices = np.arange(labels.size) + rows.start * self.starts.row
+            labels = unpack(store.get(f"label/{tile}") or {})["label"]
+            picks: Indices = np.arange(labels.size) + self.rows(tile).start * self.starts.row
         else:
             record = store.get(f"again-{again - 1}/{tile}")
-            arrays = unpack(record) if record else {"picks": _NOTHING, "label": _NOTHING}
+            arrays = {"picks": _NOTHING, "label": _NOTHING} if record is None else unpack(record)
             labels, picks = arrays["label"], arrays["picks"]
         undecided: Indices = picks[labels == 0]
         return undecided
@@ -168,18 +169,14 @@ class BasinTiles:
 
     def run(self, work: Work, *, check: bool) -> SimpleNamespace:
         """Compute what is missing; return attractors and measures by the names of the schema."""
-        store, size = work.store, math.prod(self.starts.shape)
-        if not store.shared:
-            _core.reckon("starts", size, _BYTES)
+        store = work.store
+        _core.reckon("starts", math.prod(self.starts.shape), _BYTES)
         first = work.once("plan-0", lambda: self._plan(progress=work.progress).state)
         plan = self._plan(first)
         labelled = plan.plane == "basins"
-        dtypes = _CELLS | ({} if labelled else _EXPONENT)
-        layout = dataclasses.replace(self._layout, dtypes=_named(dtypes), step="label")
-        store.create(layout)
-        undecided = np.zeros(layout.tiles, np.int64)
+        undecided = np.zeros(self.tiles, np.int64)
         periods = 0
-        for tile, record in work.each("label", "plan-0", range(layout.tiles)):
+        for tile, record in work.each("label", "plan-0", range(self.tiles)):
             arrays = unpack(record)
             undecided[tile] = int(arrays["undecided"])
             periods += int(arrays["work"])
@@ -197,18 +194,17 @@ class BasinTiles:
                 arrays = unpack(record)
                 undecided[tile] = np.count_nonzero(arrays["label"] == 0)
                 periods += int(arrays["work"])
-        whole = self._whole(plan, store, layout, moves, check=labelled and check)
+        whole = self._whole(plan, store, moves, check=labelled and check)
         attractors, last = plan.finish(np.ascontiguousarray(whole.counts[2:]))
-        final = self._renumber(work, layout, [*moves, last])
         return SimpleNamespace(
             **vars(whole),
             plan=plan,
             sources=(whole, *sources(plan, whole.texture, whole.checked, whole.counts, periods)),
             attractors=attractors,
-            cells={name: store.whole(f"{final}{name}") for name in dtypes},
+            cells=self._final(store, [*moves, last]),
         )
 
-    def _search(self, plan: _core.BasinPlan, store: Store, undecided: Indices, again: int) -> bytes:
+    def _search(self, plan: _core.BasinPlan, store: Store, undecided: Indices, again: int) -> Cells:
         """Search from undecided starts; return the next plan, none if labels are final."""
         stride = -(-int(undecided.sum()) // _SAMPLE)
         before = np.cumsum(undecided) - undecided
@@ -224,13 +220,14 @@ class BasinTiles:
             return pack(final=1)
         return pack(moved=moved, state=np.frombuffer(plan.state, np.uint8))
 
-    def _merged(self, store: Store, layout: Layout, moves: list[Labels], tile: int) -> Cells:
+    def _merged(self, store: Store, moves: list[Labels], tile: int) -> Cells:
         """Return the cells of a tile with what the steps ``again`` have found.
 
         Entry ``k`` of ``moves`` has the new number of each attractor after step ``k``.
         """
-        rows, cut = layout.rows(tile), len(_FOLDER)
-        cells = {name[cut:]: store.read(name, rows).copy() for name in layout.dtypes}
+        arrays, shape = unpack(store.get(f"label/{tile}") or {}), (-1, *self.starts.shape[1:])
+        names = [name for name in (*_CELLS, "finite_time_exponent") if name in arrays]
+        cells: Cells = {name: arrays[name].reshape(shape).copy() for name in names}
         flat = {name: values.reshape(-1) for name, values in cells.items()}
         for k, moved in enumerate(moves):
             label = flat["label"]
@@ -238,7 +235,7 @@ class BasinTiles:
             record = store.get(f"again-{k + 1}/{tile}")
             if record is not None:
                 arrays = unpack(record)
-                at = arrays["picks"] - rows.start * self.starts.row
+                at = arrays["picks"] - self.rows(tile).start * self.starts.row
                 for name in _CELLS:
                     flat[name][at] = arrays[name]
         return cells
@@ -247,13 +244,12 @@ class BasinTiles:
         self,
         plan: _core.BasinPlan,
         store: Store,
-        layout: Layout,
         moves: list[Labels],
         *,
         check: bool,
     ) -> SimpleNamespace:
         """Return what the whole map tells."""
-        rows, row = layout.shape[0], self.starts.row
+        rows, row = self.starts.shape[0], self.starts.row
         grid = plan.plane == "basins" and self.starts.axes is not None
         picks = plan.checked_starts() if check else _NOTHING
         columns, lines = _core.thinned(row, rows), _core.thinned(rows, row)
@@ -263,8 +259,8 @@ class BasinTiles:
         settled, periods, longest = 0, 0, -1
         texture = _core.TextureSum(row, rows)
         before = np.zeros((0, row), np.int16)
-        for tile in range(layout.tiles):
-            cells, at = self._merged(store, layout, moves, tile), layout.rows(tile)
+        for tile in range(self.tiles):
+            cells, at = self._merged(store, moves, tile), self.rows(tile)
             settle = cells["settle_periods"][cells["settle_periods"] >= 0]
             settled += settle.size
             periods += int(settle.sum())
@@ -295,23 +291,7 @@ class BasinTiles:
             near=near,
         )
 
-    def _renumber(self, work: Work, layout: Layout, moves: list[Labels]) -> str:
-        """Give attractors their last numbers, and starts what later steps have found.
-
-        Returns the beginning of the names of the cells. In a store they are other cells than those
-        of the steps: nothing is written over.
-        """
-        store, name = work.store, _FOLDER
-        if store.shared:
-            name = "" if self.part_of_result else f"{_FOLDER}last-"
-            dtypes = {f"{name}{key[len(_FOLDER) :]}": dtype for key, dtype in layout.dtypes.items()}
-            store.create(dataclasses.replace(layout, dtypes=dtypes, step="last"))
-        for tile in range(layout.tiles):
-            cells = self._merged(store, layout, moves, tile)
-            store.write(tile, {f"{name}{key}": values for key, values in cells.items()})
-        return name
-
-
-def _named(cells: Mapping[str, Any]) -> dict[str, Any]:
-    """Return cells by their names in the store before attractors have their last numbers."""
-    return {f"{_FOLDER}{name}": values for name, values in cells.items()}
+    def _final(self, store: Store, moves: list[Labels]) -> Cells:
+        """Return the cells of the map with the last numbers of the attractors."""
+        tiles = [self._merged(store, moves, tile) for tile in range(self.tiles)]
+        return {name: np.concatenate([cells[name] for cells in tiles]) for name in tiles[0]}

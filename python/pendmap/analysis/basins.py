@@ -221,10 +221,9 @@ def basins(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     cells, threads = Starts(grid.bare(units)), run.tiles(1)[0]
     job = BasinTiles(bare, cells, choices, units.given(1.0, RATE), threads)
 
-    def compute(work: Work) -> tuple[xr.Dataset, list[str]]:
-        raw = job.run(work, check=check)
-        dataset = xr.Dataset(coords=grid.coordinates(units))
-        return _complete(dataset, job, raw, pendulum, numerics), [*raw.cells]
+    def compute(work: Work) -> xr.Dataset:
+        dataset, raw = xr.Dataset(coords=grid.coordinates(units)), job.run(work, check=check)
+        return _complete(dataset, job, raw, pendulum, numerics)
 
     more = {"grid": grid, "layer_periods": layer_periods, "check": check}
     return run.complete("basins", pendulum, numerics.request | more, job, compute)

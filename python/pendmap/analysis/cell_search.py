@@ -21,7 +21,6 @@ from pendmap.analysis.grid import Grid
 from pendmap.analysis.orbit_table import DESCRIBED, described
 from pendmap.analysis.result import Field, Found
 from pendmap.analysis.summary import cost, undecided, window_said
-from pendmap.engine import Tile
 from pendmap.errors import MOST_CELLS, check_type, check_whole, core_errors
 from pendmap.files import facts
 from pendmap.files.variables import variable
@@ -114,7 +113,7 @@ class CellSearch:
         limits = numerics.tol, numerics.max_periods
         job = _Blocks(bare, tuple(axis.kernel for axis in self.axes), initial, limits)
 
-        def compute(work: Work) -> tuple[xr.Dataset, list[str]]:
+        def compute(work: Work) -> xr.Dataset:
             with core_errors():
                 raw, dataset, values = make(*job.run(work, run))
             values |= {
@@ -131,7 +130,7 @@ class CellSearch:
                 summary=lambda one: [*summary(one), *self._findings(one)],
                 what="attractors are",
             )
-            return dataset, []
+            return dataset
 
         arguments = {"ranges": [axis.request for axis in self.axes], **numerics.request, **request}
         arguments |= {"starts": self.starts, "box": self.box}
@@ -214,15 +213,15 @@ class _Blocks:
         tile: int,
         inputs: dict[int, bytes],
         progress: Any = None,  # noqa: ANN401
-    ) -> Tile:
+    ) -> bytes:
         """Search a block, or exchange with the blocks around it."""
         survey, number = _restored(pickle.dumps(self), state), int(step.removeprefix(_STEP))
         with core_errors():
             if number == 0:
-                return Tile(_GAINED[True] + survey.search(tile, progress=progress))
+                return _GAINED[True] + survey.search(tile, progress=progress)
             exchanged = survey.exchange(number, tile, inputs, progress=progress)
             gained = survey.gained(number, tile, exchanged or inputs[tile])
-        return Tile(_GAINED[gained] + (exchanged or b""))
+        return _GAINED[gained] + (exchanged or b"")
 
     def run(self, work: Work, run: RunOptions) -> tuple[_core.Survey, list[bytes]]:
         """Compute the blocks that are missing; return the survey and the last result of each."""

@@ -216,11 +216,11 @@ def lifetime(  # noqa: PLR0913 (physics first, numerical choices by name)
     states = Starts(None, angles, units.bare(speeds, VELOCITY))
     choices = choices_of(numerics, None, check=False)
     rate, threads = units.given(1.0, RATE), run.tiles(1)[0]
-    job = BasinTiles(bare, states, choices, rate, threads, part_of_result=False)
+    job = BasinTiles(bare, states, choices, rate, threads)
 
-    def compute(work: Work) -> tuple[xr.Dataset, list[str]]:
+    def compute(work: Work) -> xr.Dataset:
         basin_map = ends_of_list(job, work, speeds, pendulum, numerics, check=False)
-        return _complete(basin_map, pendulum, numerics, from_period, window), []
+        return _complete(basin_map, pendulum, numerics, from_period, window)
 
     return run.complete("lifetime", pendulum, request, job, compute)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-import importlib.util
+import json
 import os
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Final, TypedDict
@@ -13,13 +13,7 @@ import numpy as np
 
 from pendmap import _core
 from pendmap.analysis.grid import Grid
-from pendmap.engine import (
-    MemoryStore,
-    Work,
-    ZarrStore,
-    executor_of,
-    rounding,
-)
+from pendmap.engine import FileStore, Store, Work, rounding
 from pendmap.errors import (
     MOST_SEED,
     MOST_THREADS,
@@ -30,6 +24,7 @@ from pendmap.errors import (
     check_whole,
     short_repr,
 )
+from pendmap.files.dataset import reached
 from pendmap.model import model_text
 
 if TYPE_CHECKING:
@@ -39,12 +34,8 @@ if TYPE_CHECKING:
 
     from pendmap.model import Pendulum, Rig
 
-    Compute = Callable[[Work], tuple[xr.Dataset, list[str]]]
-    """Function that computes a result, and names its variables that are cells of the store."""
-
 Progress = Callable[[int, int], object]  # Called with units of work done and in total
 
-_DIGEST: Final = "sha256 "
 _STEPS: Final = 10_000  # Number of progress steps of a part of a computation
 
 
@@ -57,7 +48,6 @@ class Keywords(TypedDict, total=False):
     store: str | os.PathLike[str] | None
     resume: bool
     executor: Any
-    chunks: Any
 
 
 @dataclasses.dataclass(frozen=True)
@@ -77,23 +67,19 @@ class RunOptions:
         Called repeatedly with the units of work done and in total: a :class:`pendmap.ProgressBar`.
     store : str or path, optional
         A Zarr store, a path or an address of fsspec like ``s3://bucket/map.zarr``: the result is
-        computed in tiles, and each is stored as it is done. The result reads its cells when they
-        are used. A path holds an earlier result until the new one is complete, which is at the path
-        with ``.part`` until then; elsewhere an earlier result is removed.
+        computed in tiles, and each is kept as it is done, in ``map.zarr.part``. An earlier result
+        is there until the new one is complete.
     resume : bool
         Whether to go on with the store of a run that was stopped; the result is the same, bit for
         bit. A store that another request began is refused.
     executor : optional
-        Computes the tiles: a Dask client or any executor of :mod:`concurrent.futures`, like those
-        of joblib, mpi4py and submitit. Each tile has one thread unless ``threads`` says otherwise.
-    chunks : optional
-        As for :func:`xarray.open_zarr`: the result of a store has arrays of Dask, ``{}`` with the
-        tiles as chunks.
+        Computes the tiles: any executor of :mod:`concurrent.futures`, like those of joblib and
+        mpi4py, or a Dask client. Each tile has one thread unless ``threads`` says otherwise.
 
     Raises
     ------
     InputError
-        If a value is outside its range, or ``resume`` or ``chunks`` are given without a store.
+        If a value is outside its range, or ``resume`` is given without a store.
 
     Examples
     --------
@@ -109,7 +95,6 @@ class RunOptions:
     store: str | os.PathLike[str] | None = None
     resume: bool = False
     executor: Any = None
-    chunks: Any = None
 
     def __post_init__(self) -> None:
         if self.threads is not None:
@@ -119,12 +104,13 @@ class RunOptions:
         check_callable("progress", self.progress)
         if self.store is not None:
             _address(self.store)
-        check_flag("resume", self.resume)
-        for what in ("resume", "chunks"):
-            if self.store is None and getattr(self, what) not in (False, None):
-                raise InputError(f"{what} must be given with a store (.zarr), got none")
-        if self.chunks is not None and importlib.util.find_spec("dask") is None:
-            raise InputError("chunks need the extra pendmap[dask]")
+        if check_flag("resume", self.resume) and self.store is None:
+            raise InputError("resume must be given with a store (.zarr), got none")
+        if self.executor is not None and not hasattr(self.executor, "submit"):
+            like = "like concurrent.futures.ProcessPoolExecutor or a Dask client"
+            raise InputError(
+                f"executor must have submit(), {like}, got {short_repr(self.executor)}"
+            )
 
     @classmethod
     def of(cls, run: RunOptions | None, options: Keywords) -> RunOptions:
@@ -171,102 +157,53 @@ class RunOptions:
         model: Pendulum | Rig,
         arguments: Mapping[str, Any],
         job: Any,  # noqa: ANN401 (of the analysis)
-        compute: Compute,
+        compute: Callable[[Work], xr.Dataset],
     ) -> xr.Dataset:
         """Return the result of ``compute``, or of the store if it is complete there."""
-        with executor_of(executor=self.executor) as executor:
-            if self.store is None:
-                return compute(Work(job, MemoryStore(), executor, self.progress))[0]
-            store = ZarrStore(_address(self.store))
-            mark = _request(name, model, arguments)
-            with store.held():
-                if self._begin(store, mark):
-                    return store.result(self.chunks, again=True)
-                work = Work(job, store, executor, self.progress)
-                try:
-                    with work.named(store.unfinished):
-                        dataset, cells = compute(work)
-                        store.complete(dataset, cells, {**mark, "complete": True})
-                except BaseException:
-                    store.abandon()
-                    raise
-            return store.result(self.chunks)
-
-    def _begin(self, store: ZarrStore, mark: dict[str, Any]) -> bool:
-        """Begin a store or go on with one; return whether it is complete."""
-        old = store.mark(resume=self.resume)
-        if old is not None and self.resume:
-            self._check(store.address, old, mark)
-            if not old["complete"]:
-                store.go_on()
-            return bool(old["complete"])
-        if old is not None and not old["complete"]:
-            raise InputError(
-                f"{store.unfinished}: is an unfinished run: --resume (resume=True) goes on with "
-                "it; a new run must have another name"
-            )
-        store.begin({**mark, "complete": False})
-        return False
-
-    def _check(self, address: str, old: Mapping[str, Any], mark: Mapping[str, Any]) -> None:
-        """Refuse a store that another request, another version or another arithmetic began."""
-        for key, what in (("analysis", "analysis"), ("version", "version of pendmap")):
-            if old[key] != mark[key]:
-                raise InputError(f"{address}: was begun by {what} {old[key]}, not {mark[key]}")
-        before, now = (_flat(one) for one in (old, mark))
-        for key in sorted({*before, *now}):
-            if before.get(key) != now.get(key):
-                stored, given = (short_repr(one.get(key)) for one in (before, now))
-                raise InputError(f"{address}: was begun with {key} = {stored}, not {given}")
-        if old["rounding"] != mark["rounding"]:
-            raise InputError(
-                f"{address}: was begun with an instruction set that rounds otherwise "
-                f"({old['rounding']}, here {mark['rounding']})"
-            )
+        if self.store is None:
+            return compute(Work(job, Store(), self.executor, self.progress))
+        store = FileStore(_address(self.store))
+        with store.held(), reached(store.address):
+            result = store.begin(_request(name, model, arguments), resume=self.resume)
+            if result is None:
+                work = Work(job, store, self.executor, self.progress)
+                with work.named(store.unfinished):
+                    result = compute(work)
+                    store.complete(result)
+        return result
 
 
 def _address(store: str | os.PathLike[str]) -> str:
     """Return the address of a store; a folder must be named like one."""
     name = os.fspath(store) if isinstance(store, str | os.PathLike) else ""
-    name = name.removeprefix("file://")
-    if "://" not in name and not name.rstrip("/").endswith(".zarr"):
-        raise InputError(
-            "store must be a folder NAME.zarr, or an address like s3://bucket/map.zarr, got "
-            f"{short_repr(store)}"
-        )
+    name = name.removeprefix("file://").rstrip("/")
+    if "://" not in name and not name.endswith(".zarr"):
+        form = "a folder NAME.zarr, or an address like s3://bucket/map.zarr"
+        raise InputError(f"store must be {form}, got {short_repr(store)}")
     return name
 
 
 def _request(name: str, model: Pendulum | Rig, arguments: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a request as JSON has it."""
-    return {
+    """Return a request as JSON has it, with the numbers of the model one by one."""
+    text = model_text(dataclasses.replace(model, notes={}))
+    request: dict[str, Any] = {
         "analysis": name,
-        "version": _core.__version__,
-        "rounding": rounding(),
-        "model": model_text(dataclasses.replace(model, notes={})),
-        "arguments": {key: _plain(value) for key, value in arguments.items()},
+        "version of pendmap": _core.__version__,
+        "rounding of the processor": rounding(),
     }
+    for line in text.splitlines():
+        key, _, value = line.partition(" = ")
+        request[f"model: {key}"] = value
+    return {**request, "model": text, **json.loads(json.dumps(arguments, default=_plain))}
 
 
 def _plain(value: Any) -> Any:  # noqa: ANN401 (an argument)
-    match value:
-        case Grid():
-            return [list(value.theta.as_tuple), list(value.velocity.as_tuple)]
-        case np.ndarray():
-            return _DIGEST + hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest()
-        case dict():
-            return {str(key): _plain(part) for key, part in value.items()}
-        case tuple() | list():
-            return [_plain(part) for part in value]
-        case np.generic():
-            return value.item()
-    return value
-
-
-def _flat(mark: Mapping[str, Any]) -> dict[str, Any]:
-    """Return arguments and lines of the model of a request by their names."""
-    lines = (line.partition(" = ") for line in mark["model"].splitlines())
-    return {**{f"model: {k}": v for k, _, v in lines}, **mark["arguments"]}
+    """Return an argument for JSON, an array as its digest."""
+    if isinstance(value, np.ndarray):
+        return hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest()
+    if isinstance(value, Grid):
+        return [value.theta.as_tuple, value.velocity.as_tuple]
+    return value.item() if isinstance(value, np.generic) else dict(value)
 
 
 def part(progress: Progress | None, number: int, parts: int) -> Progress | None:
@@ -284,18 +221,14 @@ def part(progress: Progress | None, number: int, parts: int) -> Progress | None:
 
 
 def in_rounds(progress: Progress | None, typical: int) -> Progress | None:
-    """Return the progress of rounds whose number is not known: it rises with each, and never falls.
-
-    A round begins where the work done does not rise. After k rounds the share is k / (k +
-    ``typical``).
-    """
+    """Return the progress of rounds of unknown number: after k the share is k / (k + typical)."""
     if progress is None:
         return None
     rounds, last = 0, 0
 
     def report(done: int, total: int) -> None:
         nonlocal rounds, last
-        rounds += done <= last
+        rounds += done <= last  # a round begins where the work done does not rise
         last = done
         passed = rounds + done / max(total, 1)
         progress(round(_STEPS * passed / (passed + typical)), _STEPS)

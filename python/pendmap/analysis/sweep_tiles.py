@@ -32,7 +32,7 @@ from pendmap.analysis.orbit_table import distance, matched
 from pendmap.analysis.result import of_core
 from pendmap.analysis.run import part
 from pendmap.analysis.varied import with_values
-from pendmap.engine import Tile, pack, unpack
+from pendmap.engine import pack, unpack
 from pendmap.errors import InputError, core_errors
 
 if TYPE_CHECKING:
@@ -173,7 +173,7 @@ class SweepTiles:
         tile: int,
         inputs: Any,  # noqa: ANN401, ARG002
         progress: Any = None,  # noqa: ANN401
-    ) -> Tile:
+    ) -> dict[str, NDArray[Any]]:
         """Map the basins of all models of a block."""
         places, plan = self.places(tile), None
         choices: _core._Choices = {**self.choices, "threads": self.threads}
@@ -188,7 +188,7 @@ class SweepTiles:
             labels.append(label)
             maps.append(one)
         text = np.frombuffer(json.dumps(maps).encode(), np.uint8)
-        return Tile(pack(label=np.stack(labels), maps=text))
+        return pack(label=np.stack(labels), maps=text)
 
     def _mapped(
         self,
@@ -233,16 +233,14 @@ class SweepTiles:
                 maps[place] = Mapped(measures, [Found(*one) for one in attractors])
         return {place: maps[place] for place in np.ndindex(*self.shape)}
 
-    def labels(self, store: Store, numbers: Numbers, row: int) -> NDArray[np.int16]:
-        """Return the labels of a row of blocks by the numbers of the whole sweep."""
-        first, across = row * self.side[0], math.prod(self.blocks[1:])
-        shape = (min(self.side[0], self.shape[0] - first), *self.shape[1:], *self.cells)
-        labels = np.zeros(shape, dtype=np.int16)
-        for tile in range(row * across, (row + 1) * across):
-            label = unpack(store.get(f"{_STEP}/{tile}") or b"")["label"]
+    def labels(self, store: Store, numbers: Numbers) -> NDArray[np.int16]:
+        """Return the labels of all maps by the numbers of the whole sweep."""
+        labels = np.zeros((*self.shape, *self.cells), dtype=np.int16)
+        for tile in range(math.prod(self.blocks)):
+            label = unpack(store.get(f"{_STEP}/{tile}") or {})["label"]
             for place, one in zip(self.places(tile), label, strict=True):
                 moved = np.array([-1, 0, *(k + 1 for k in numbers[place])], dtype=np.int16)
-                labels[(place[0] - first, *place[1:])] = moved[one + 1].reshape(self.cells)
+                labels[place] = moved[one + 1].reshape(self.cells)
         return labels
 
 

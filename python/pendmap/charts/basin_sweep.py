@@ -4,30 +4,16 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
 from pendmap.analysis.orbit_table import attractors_of
 from pendmap.analysis.sweep_table import varied_names
-from pendmap.charts import names, palette, parameters, plane
+from pendmap.charts import names, palette, plane
 from pendmap.charts.chart import Axis, Chart, Panel, holding
 from pendmap.charts.legend import typeset
-from pendmap.charts.marks import (
-    DASHED,
-    INK,
-    QUIET,
-    Band,
-    Colours,
-    Image,
-    Level,
-    Line,
-    Mark,
-    Points,
-    Text,
-    bars,
-)
+from pendmap.charts.marks import QUIET, Band, Colours, Image, Level, Line, Points, Text, bars
 from pendmap.files import facts
 from pendmap.formatting import typographic
 from pendmap.units import Units
@@ -37,7 +23,7 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-    from pendmap.charts.marks import Ends, Floats
+    from pendmap.charts.marks import Ends, Floats, Mark
 
 
 MOST: Final = 12  # Greatest number of attractors that a legend names; all others are grey
@@ -56,11 +42,9 @@ _SIZE: Final = (7.4, 8.4)  # Size of a figure over one parameter, inches
 _HEIGHTS: Final = {"fraction": 2.6, "entropy": 1.2, "uncertainty": 1.2, "exponent": 1.3}
 
 
-@dataclass(frozen=True)
-class Branch:
-    """An attractor of a sweep, with its colour."""
+class Branch(NamedTuple):
+    """An attractor of a sweep: its name in a legend, empty for the others, and its colour."""
 
-    id: int
     name: str
     colour: str
 
@@ -71,9 +55,8 @@ def listed(dataset: xr.Dataset, most: int | None = MOST) -> list[Branch]:
     Those of equal plain names have successive colours of their family.
     """
     share = dataset["fraction"].sum(varied_names(dataset)).values
-    if most is not None and share.size == most + 1:
-        most = None
-    named = set(np.argsort(-share, kind="stable")[:most].tolist())
+    most = None if share.size == MOST + 1 else most
+    frequent = set(np.argsort(-share, kind="stable")[:most].tolist())
     seen: Counter[str] = Counter()
     branches = []
     chosen = dataset["colour"].values.tolist() if "colour" in dataset else [""] * share.size
@@ -81,7 +64,7 @@ def listed(dataset: xr.Dataset, most: int | None = MOST) -> list[Branch]:
         colour = chosen[k] or palette.colour(one, seen[one.plain])
         seen[one.plain] += 1
         name = typeset(str(dataset["attractor"].values[k]))
-        branches.append(Branch(k + 1, *((name, colour) if k in named else ("", OTHERS))))
+        branches.append(Branch(name, colour) if k in frequent else Branch("", OTHERS))
     return branches
 
 
@@ -93,20 +76,20 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
     number = math.prod(dataset.sizes[one] for one in dims)
     fixed = names.parameters(facts(dataset), dims)
     subtitle = f"{fixed};   {number} maps of {columns} × {rows} cells"
-    titles = f"Basins along {parameters.over(dims)}", subtitle
+    titles = f"Basins along {names.over(dims)}", subtitle
     if len(dims) == 1:
         return _line(dataset, dims[0], titles, layer)
     first, second = dims
     shares = {f"share {k + 1}": k for k in range(dataset.sizes["attractor"])}
-    parameters.check_layer(layer, [*LAYERS, *shares], "this sweep: ")
     dataset = dataset.transpose(second, first, ...)
 
     def make(name: str, across: Ends, up: Ends) -> tuple[str, list[Mark]]:
         title, values, colours = _layer(dataset, name, shares.get(name), cells)
         return title, [Image(values, across, up, colours=colours, path="values")]
 
-    shown = [layer] if layer else list(LAYERS)
-    return parameters.layers(dataset, (first, second), titles, make, shown, _LEADING)
+    known, others = [*LAYERS, *shares], [name for name in LAYERS if name not in _LEADING]
+    varied, shown = (first, second), (_LEADING, others)
+    return names.layers(dataset, varied, titles, make, known, shown, layer)
 
 
 def models(
@@ -115,12 +98,10 @@ def models(
     """Yield the parameters of each model, row by row, its basins, and their height over width."""
     dims, units = varied_names(dataset), Units.of(facts(dataset))
     theta, velocity = (plane.outer_edges(dataset, axis) for axis in ("theta", "velocity"))
-    sides, ratio = (
-        names.phase_plane(theta, velocity, units),
-        names.proportion(theta, velocity, units),
-    )
+    sides = names.phase_plane(theta, velocity, units)
+    ratio = names.proportion(theta, velocity, units)
     classes = [("failed", palette.FAILED), ("undecided", palette.UNDECIDED)]
-    classes += [(one.name, one.colour) for one in listed(dataset, None)]
+    classes += listed(dataset, None)
     planes = dataset[["label", "theta_bounds", "velocity_bounds"]]
     for place in np.ndindex(*(dataset.sizes[dim] for dim in dims)):
         at = [(dim, float(dataset[dim].values[k])) for dim, k in zip(dims, place, strict=True)]
@@ -141,18 +122,18 @@ def models(
 
 def _line(dataset: xr.Dataset, dim: str, titles: tuple[str, str], layer: str | None) -> Chart:
     """Return the chart over one parameter."""
-    x, every = dataset[dim].values, listed(dataset)
-    below = parameters.axis(dataset, dim)
+    every, below = listed(dataset), names.parameter_axis(dataset, dim)
     bare = Axis("", below.ends, ticks=()) if layer is None else below
-    entropies = _entropies(dataset, x)
     exponent = f"exponent\n{names.per_time(Units.of(facts(dataset)))}"
+    whole, edge = dataset["basin_entropy"].values, dataset["boundary_basin_entropy"].values
+    highest = float(np.nanmax(np.append(whole, edge), initial=1.1 * math.log(2)))
     parts: dict[str, tuple[Axis, list[Mark]]] = {
         "fraction": (Axis("share of the starts", (0.0, 1.0)), _stack(dataset, dim, every)),
-        "entropy": (Axis("entropy\n(nat)", _from_0(entropies, math.log(2))), entropies),
-        "uncertainty": (Axis("uncertainty\nexponent", (0.0, 1.1)), _uncertainty(dataset, x)),
+        "entropy": (Axis("entropy\n(nat)", (0.0, 1.06 * highest)), _entropies(dataset, dim)),
+        "uncertainty": (Axis("uncertainty\nexponent", (0.0, 1.1)), _uncertainty(dataset, dim)),
         "exponent": (
-            Axis(exponent, parameters.rates(dataset["exponent"].values)),
-            _growth(dataset, x, every, named=layer is not None),
+            Axis(exponent, holding(dataset["exponent"].values, 0.0)),
+            _growth(dataset, dim, every, named=layer is not None),
         ),
     }
     panels = [
@@ -174,78 +155,70 @@ def _line(dataset: xr.Dataset, dim: str, titles: tuple[str, str], layer: str | N
 def _stack(dataset: xr.Dataset, dim: str, every: list[Branch]) -> list[Mark]:
     """Return the shares of the attractors on one another with errors, then undecided starts."""
     x, edges = dataset[dim].values, np.repeat(plane.edges(dataset, dim), 2)[1:-1]
-    fraction, stderr = dataset["fraction"].values, dataset["stderr"].values
-    top = np.zeros(x.size)
-    marks: list[Mark] = []
-    grey = sum(not one.name for one in every)
+    grey = f"{sum(not one.name for one in every)} others"
+    none = np.zeros(x.size)
     layers = [
-        (one.name or f"{grey} others", one.colour, fraction[:, k]) for k, one in enumerate(every)
+        (one.name or grey, one.colour, share, error if one.name else none)
+        for one, share, error in zip(
+            every, dataset["fraction"].values.T, dataset["stderr"].values.T, strict=True
+        )
     ]
-    layers.append(("undecided", palette.UNDECIDED, dataset["undecided"].values))
-    layers.append(("failed", palette.FAILED, dataset["failed"].values))
-    for k, (name, colour, share) in enumerate(layers):
+    layers.append(("undecided", palette.UNDECIDED, dataset["undecided"].values, none))
+    layers.append(("failed", palette.FAILED, dataset["failed"].values, none))
+    top = none
+    marks: list[Mark] = []
+    for k, (name, colour, share, error) in enumerate(layers, 1):
         if not share.any():
             continue
         low, top = top, top + share
         ends = np.repeat(low, 2), np.repeat(top, 2)
-        marks.append(Band(edges, *ends, colour=colour, name=name, path=f"{k + 1}/share"))
-        size = stderr[:, k] if k < len(every) and every[k].name else np.zeros(x.size)
-        mine = size > 0
-        at = bars(x[mine], (top - size)[mine], (top + size)[mine])
-        marks.append(Line(*at, width=0.6, colour=INK, order=3.0))
+        marks.append(Band(edges, *ends, colour=colour, name=name, path=f"{k}/share"))
+        half = np.where(error > 0, error, np.nan)
+        marks.append(Line(*bars(x, top - half, top + half), width=0.6, order=3.0))
     return marks
 
 
-def _entropies(dataset: xr.Dataset, x: Floats) -> list[Mark]:
+def _entropies(dataset: xr.Dataset, dim: str) -> list[Mark]:
     """Return the entropy of the plane and that of the boundary with its error."""
-    whole, edge = dataset["basin_entropy"].values, dataset["boundary_basin_entropy"].values
-    edge = np.where(dataset["boundary_boxes"].values > 0, edge, np.nan)
-    error = dataset["boundary_basin_entropy_stderr"].values
+    x, whole = dataset[dim].values, dataset["basin_entropy"].values
+    known = dataset["boundary_boxes"].values > 0
+    edge = np.where(known, dataset["boundary_basin_entropy"].values, np.nan)
+    text = "of the boundary (dashed: ln 2, fractal above)"
     return [
-        Level(math.log(2), colour=QUIET, dash=DASHED),
+        Level(math.log(2), colour=QUIET, dash="--"),
         Line(x, whole, colour=palette.CURVES[2], name="basin entropy", path="whole"),
-        Line(
-            x,
-            edge,
-            colour=INK,
-            name="of the boundary (dashed: ln 2, fractal above)",
-            path="boundary",
-        ),
-        *_error(x, edge, error, INK),
+        *_with_error(x, edge, dataset["boundary_basin_entropy_stderr"].values, "boundary", text),
     ]
 
 
-def _uncertainty(dataset: xr.Dataset, x: Floats) -> list[Mark]:
+def _uncertainty(dataset: xr.Dataset, dim: str) -> list[Mark]:
     """Return the uncertainty exponent with its error: 1 where the boundary is smooth."""
     value, error = (dataset[f"uncertainty_exponent{end}"].values for end in ("", "_stderr"))
     if not np.isfinite(value).any():
         return []
-    level = Level(1.0, colour=QUIET, dash=DASHED)
-    return [level, Line(x, value, colour=INK, path="value"), *_error(x, value, error, INK)]
+    level = Level(1.0, colour=QUIET, dash="--")
+    return [level, *_with_error(dataset[dim].values, value, error, "value")]
 
 
-def _error(x: Floats, value: Floats, error: Floats, colour: str) -> list[Mark]:
-    known = np.isfinite(value) & np.isfinite(error)
-    at = bars(x[known], (value - error)[known], (value + error)[known])
-    dots = Points(x[known], value[known], colour=colour, size=2.0)
-    return [Line(*at, width=0.7, colour=colour), dots]
+def _with_error(x: Floats, value: Floats, error: Floats, path: str, name: str = "") -> list[Mark]:
+    dots = np.where(np.isfinite(error), value, np.nan)
+    return [
+        Line(x, value, path=path, name=name),
+        Line(*bars(x, value - error, value + error), width=0.7),
+        Points(x, dots, size=2.0),
+    ]
 
 
-def _growth(dataset: xr.Dataset, x: Floats, every: list[Branch], *, named: bool) -> list[Mark]:
+def _growth(dataset: xr.Dataset, dim: str, every: list[Branch], *, named: bool) -> list[Mark]:
     """Return the largest Lyapunov exponent of each attractor, for the legend if ``named``."""
     marks: list[Mark] = [Level(0.0, colour=QUIET)]
-    for k, one in enumerate(every):
-        at = x, dataset["exponent"].values[:, k]
+    for k, one in enumerate(every, 1):
+        at = dataset[dim].values, dataset["exponent"].values[:, k - 1]
         colour, order = palette.on_white(one.colour), 2.0 if one.name else 1.0
         look: dict[str, Any] = {"colour": colour, "order": order}
         marks.append(Line(*at, width=0.8, name=one.name if named else "", **look))
-        marks.append(Points(*at, size=2.2, path=f"{one.id}/exponent", **look))
+        marks.append(Points(*at, size=2.2, path=f"{k}/exponent", **look))
     return marks
-
-
-def _from_0(marks: list[Mark], least: float) -> Ends:
-    values = [np.asarray(mark.y) for mark in marks if isinstance(mark, Line)]
-    return 0.0, holding(*values, [0.0, 1.1 * least])[1]
 
 
 def _layer(
@@ -264,8 +237,8 @@ def _layer(
         boxes = plane.pixels(dataset, dataset["boundary_boxes"], cells)
         values = np.where(boxes > 0, values, np.nan)
     if layer == "attractors":
-        return title, values, parameters.counts(text, values)
+        return title, values, names.counts(text, values)
     if not unit:
         return title, values, Colours(text, "cividis", 0.0, 1.0)
-    high = max(float(values[np.isfinite(values)].max(initial=0.0)), 1e-3)
+    high = float(np.nanmax(values, initial=1e-3))
     return title, values, Colours(f"{text} ({unit})", "magma", 0.0, high)

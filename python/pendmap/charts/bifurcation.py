@@ -9,11 +9,10 @@ import numpy as np
 
 from pendmap._core import Attractor
 from pendmap.analysis.orbit_table import attractors_of
-from pendmap.charts import names, palette, parameters, plane
-from pendmap.charts.chart import Axis, Chart, Panel
+from pendmap.charts import names, palette, plane
+from pendmap.charts.chart import Axis, Chart, Panel, holding
 from pendmap.charts.legend import colours_of, typeset
 from pendmap.charts.marks import QUIET, Image, Level, Mark, Points
-from pendmap.errors import InputError
 from pendmap.files import facts
 from pendmap.units import Units
 
@@ -25,7 +24,6 @@ if TYPE_CHECKING:
 
 MOST: Final = 16  # Greatest number of families that a legend names; all others are grey
 _POINTS: Final = ("theta", "velocity")  # What the points of a diagram show
-_BELOW: Final = ("sweeps", "exponent")
 _SIZE: Final = (7.4, 6.8)  # Size of the figure, inches
 _HEIGHTS: Final = (2.4, 0.42, 1.6)  # Relative heights of points, sweeps and exponents
 _STRIP: Final = Axis("", (-1.0, 1.0), ticks=((0.5, "up →"), (-0.5, "← down")))
@@ -50,23 +48,18 @@ class Family:
 
 def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -> Chart:
     """Return angles and velocities of the points, the sweeps, and the exponents."""
-    shown = layer or _POINTS[0]
-    if shown not in (*_POINTS, *_BELOW):
-        layers = ", ".join([*_POINTS, *_BELOW])
-        raise InputError(f"layer must be one of {layers} in a diagram, got {shown!r}")
-    alone = shown in _BELOW
     varied = str(dataset.attrs["varied"])
-    below, every = parameters.axis(dataset, varied), families(dataset)
+    below, every = names.parameter_axis(dataset, varied), families(dataset)
     units, ends = Units.of(facts(dataset)), plane.outer_edges(dataset, varied)
     theta = plane.angles(dataset, dataset["point_theta"].values)
-    speeds = plane.padded(np.append(dataset["point_velocity"].values, 0.0))
+    speeds = holding(dataset["point_velocity"].values, 0.0)
     angle, speed = names.phase_plane(theta, speeds, units)
     bare = Axis("", ends, ticks=())
-    growth = parameters.rates(dataset["entry_exponent"].values)
+    growth = holding(dataset["entry_exponent"].values, 0.0)
     rate = Axis(f"exponent {names.per_time(units)}", growth)
     exponents: list[Mark] = [Level(0.0, colour=QUIET)]
     for k, one in reversed([*enumerate(every)]):
-        name = _text(every, k) if alone else ""
+        name = _text(every, k) if layer == "exponent" else ""
         exponents.append(_dots(dataset, one, one.exponents, 1.6, f"{k}/points", name))
     panels = [
         Panel("theta", "", bare, angle, _points(dataset, every, "theta"), root="bifurcation"),
@@ -76,15 +69,15 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
     ]
     count, starts = dataset.sizes[varied], int(dataset.attrs["starts"])
     return Chart(
-        f"Bifurcations over {parameters.over([varied])}",
+        f"Bifurcations over {names.over([varied])}",
         f"{names.parameters(facts(dataset), [varied])};   {count} values, {starts} starts each",
-        [[panels[0 if alone else _POINTS.index(shown)]], [panels[2]], [panels[3]]],
+        [[panels[0]], [panels[2]], [panels[3]]],
         recorded=panels,
         heights=_HEIGHTS,
         size=_SIZE,
         letters=False,
         tabs=True,
-    ).only(shown if alone else None)
+    ).only(layer)
 
 
 def _dots(  # noqa: PLR0913, PLR0917 (what points are, and their look)
@@ -102,7 +95,8 @@ def _points(dataset: xr.Dataset, every: list[Family], which: str) -> list[Mark]:
     size = min(3.0, max(1.3, 200.0 / values.size))
     drawn: list[Mark] = []
     if dataset.sizes.get("loose"):
-        loose = dataset["loose_value"].values, dataset[f"loose_{which}"].values
+        shown = np.isin(dataset["loose_value"].values, values)
+        loose = (dataset[f"loose_{name}"].values[shown] for name in ("value", which))
         look: dict[str, Any] = {"colour": palette.UNNAMED, "name": "sweep, undecided"}
         drawn.append(Points(*loose, size=0.45, order=1.0, **look))
     for k, one in reversed([*enumerate(every)]):
@@ -139,31 +133,31 @@ def families(dataset: xr.Dataset) -> list[Family]:
     Twins that lean to opposite sides are of one family. Chaos is always among the :data:`MOST`
     named ones, however rare.
     """
-    every, called = attractors_of(dataset, "kind_"), dataset["kind"].values
-    shades = colours_of(dataset, "kind_")
-    members: dict[tuple[str, int | None, int], list[int]] = {}
-    for k, one in enumerate(every):
-        members.setdefault((one.kind, one.n, one.w), []).append(k)
-    group = np.zeros(len(every), dtype=np.intp)
-    for number, places in enumerate(members.values()):
-        places.sort(key=lambda k: abs(every[k].lean))
-        group[places] = number
+    every, shades = attractors_of(dataset, "kind_"), colours_of(dataset, "kind_")
+    numbers: dict[tuple[str, int | None, int], int] = {}
+    keys = [(one.kind, one.n, one.w) for one in every]
+    group = np.array([numbers.setdefault(key, len(numbers)) for key in keys], dtype=np.intp)
     which, value = group[dataset["entry_kind"].values], dataset["entry_value"].values
-    count = np.bincount(which, minlength=len(members))
+    # A selection of values has the attractors of all.
+    chosen = dataset[str(dataset.attrs["varied"])].values
+    here = np.isin(value, chosen)
+    count = np.bincount(which[here], minlength=len(numbers))
     points = np.column_stack([dataset["point_value"].values, plane.points(dataset)])
-    of_point = which[dataset["point_entry"].values]
-    sweeps = {key: np.append(which, -1)[dataset[key].values] for key in ("up", "down")}
-    listed: list[Family] = []
-    regular = np.array([not every[places[0]].chaotic for places in members.values()], dtype=bool)
+    of_point = np.where(np.isin(points[:, 0], chosen), which[dataset["point_entry"].values], -1)
+    up, down = (np.append(which, -1)[dataset[key].values] for key in ("up", "down"))
+    chaos = group[[k for k, one in enumerate(every) if one.chaotic]]
+    regular = ~np.isin(np.arange(count.size), chaos)
     first = np.lexsort((-count, regular, count == 0))[:MOST]
     order = np.lexsort((-count, ~np.isin(np.arange(count.size), first)))[: np.sum(count > 0)]
+    listed: list[Family] = []
     for k in order.tolist():
-        (kind, n, w), places = [*members.items()][k]
-        here = which == k
-        exponents = np.stack([value[here], dataset["entry_exponent"].values[here]], axis=1)
-        name = str(called[places[0]]) if len(places) == 1 else Attractor(kind, n or 0, w).name
+        places = sorted(np.flatnonzero(group == k).tolist(), key=lambda at: abs(every[at].lean))
+        one, mine = every[places[0]], here & (which == k)
+        exponents = np.stack([value[mine], dataset["entry_exponent"].values[mine]], axis=1)
+        name = str(dataset["kind"].values[places[0]])
+        if len(places) > 1:
+            name = Attractor(one.kind, one.n or 0, one.w).name
         shade = palette.on_white(shades[places[0]]) if len(listed) < MOST else palette.UNNAMED
-        on = (sweeps["up"] == k, sweeps["down"] == k)
-        chaotic = every[places[0]].chaotic
-        listed.append(Family(name, shade, chaotic, points[of_point == k], exponents, *on))
+        on = (points[of_point == k], exponents, up == k, down == k)
+        listed.append(Family(name, shade, one.chaotic, *on))
     return listed

@@ -7,11 +7,13 @@ of several charts. No drawing library is imported here.
 from __future__ import annotations
 
 import dataclasses
+import textwrap
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
+from pendmap.charts.marks import QUIET, Text
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
@@ -30,14 +32,13 @@ class Axis:
 
     ``name`` is symbol and unit, separated by a blank. Without ``ends`` the axis contains the marks.
     With the ``scale`` ``angle`` labels are multiples of pi; ``signed`` is logarithmic beyond
-    ``straight`` on both sides of 0. Labels are values times ``factor``, or else ``ticks``.
+    ``straight`` on both sides of 0. The places of ``ticks``, if given, have their texts.
     """
 
     name: str = ""
     ends: Ends | None = None
     scale: Literal["plain", "angle", "log", "signed"] = "plain"
     straight: float = 0.0
-    factor: float = 1.0
     ticks: Sequence[tuple[float, str]] | None = None
 
 
@@ -71,9 +72,8 @@ class Chart:
 
     ``rows`` are the rows of panels of a figure, from the top; ``heights`` are their relative
     heights, ``ratio`` the height of a panel over its width, and ``size`` the size of the figure in
-    inches, if fixed. Rows of fewer panels than ``columns`` are not filled. A recording shows the
-    panels ``recorded``, by default those of the figure, as ``tabs`` or below one another;
-    ``remark`` ends its legend.
+    inches, if fixed. A recording shows the panels ``recorded``, by default those of the figure, as
+    ``tabs`` or below one another. ``notes`` are below the panels.
     """
 
     title: str
@@ -84,10 +84,8 @@ class Chart:
     heights: Sequence[float] = ()
     ratio: float = 0.8
     size: Ends | None = None
-    columns: int = 0
     letters: bool = True
     tabs: bool = False
-    remark: str = ""
     notes: Sequence[str] = ()
 
     @property
@@ -104,7 +102,7 @@ class Chart:
         """Return the chart with one of its panels alone; unchanged without a name."""
         if layer is None:
             return self
-        panel = self.whole(_named(self.panels, layer))
+        panel = self.whole(_named([*self.panels, *self.recorded], layer))
         return dataclasses.replace(self, rows=[[panel]], heights=(), notes=(), size=size)
 
     def in_width(self, width: float) -> Chart:
@@ -125,7 +123,7 @@ class Chart:
             for k in range(0, len(row), fit):
                 rows.append(row[k : k + fit])
                 heights.append(tall)
-        return dataclasses.replace(self, rows=rows, heights=heights, columns=0, size=None)
+        return dataclasses.replace(self, rows=rows, heights=heights, size=None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,36 +140,44 @@ class Sheet:
     legend: bool = False
 
     @property
+    def charts(self) -> list[Chart]:
+        """Return the charts of all columns."""
+        return [chart for column in self.columns for chart in column]
+
+    @property
     def panels(self) -> list[Panel]:
         """Return the panels of all charts."""
-        charts = (chart for column in self.columns for chart in column)
-        return [chart.whole(panel) for chart in charts for panel in chart.panels]
+        return [chart.whole(panel) for chart in self.charts for panel in chart.panels]
 
     def only(self, layer: str | None) -> Sheet | Chart:
         """Return a chart of the first panel of a name, below its heading; the sheet without one."""
         if layer is None:
             return self
         panel = _named(self.panels, layer)
-        charts = (chart for column in self.columns for chart in column)
-        mine = next(one for one in charts if layer in {item.name for item in one.panels})
+        mine = next(one for one in self.charts if layer in {item.name for item in one.panels})
         return Chart(self.title, mine.title or self.subtitle, [[panel]])
 
 
 def _named(panels: Sequence[Panel], layer: str) -> Panel:
     """Return the first panel of a name."""
-    known: dict[str, Panel] = {}
     for panel in panels:
-        known.setdefault(panel.name, panel)
-    if layer in known:
-        return known[layer]
-    if len(known) == 1:
-        raise InputError(f"no layer {layer!r}: this figure has one part")
-    raise InputError(f"no layer {layer!r} in this figure; it has {', '.join(known)}")
+        if panel.name == layer:
+            return panel
+    known = dict.fromkeys(panel.name for panel in panels)
+    has = f"it has {', '.join(known)}" if len(known) > 1 else "it has one part"
+    raise InputError(f"no layer {layer!r} in this figure; {has}")
 
 
 def bare(name: str, *marks: Mark, high: float = 1.0) -> Panel:
     """Return a panel without a frame, 1 wide and ``high`` from the top down."""
     return Panel(name, "", Axis("", (0.0, 1.0)), Axis("", (high, 0.0)), marks, bare=True)
+
+
+def nothing(title: str, why: str, letters: int = 90) -> Chart:
+    """Return a chart with the reason for an empty figure, in lines of at most ``letters``."""
+    why = textwrap.fill(f"{why[:1].upper()}{why[1:].rstrip('.')}.", letters)
+    words = Text(0.0, 0.0, why, colour=QUIET, align=("left", "top"))
+    return Chart(title, "", [[bare("nothing", words)]], size=(8.6, 0.9))
 
 
 def holding(*values: npt.ArrayLike, margin: float = 0.06) -> Ends:

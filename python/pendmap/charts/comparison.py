@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.charts import names, plane
-from pendmap.charts.chart import Axis, Chart, Panel, Sheet, bare, holding
+from pendmap.charts.chart import Axis, Chart, Panel, Sheet, bare, holding, nothing
 from pendmap.charts.identification import error_panels, residuals
-from pendmap.charts.marks import QUIET, Areas, Level, Line, Mark, Points, Span, Text
-from pendmap.charts.methods import MEASURED, look, nothing
+from pendmap.charts.marks import QUIET, Areas, Level, Line, Mark, Points, Text
+from pendmap.charts.palette import MEASURED, look
 from pendmap.comparison.experiment import written
 from pendmap.comparison.forced import ForcedComparison
 from pendmap.comparison.free import MODEL, RunComparison
@@ -23,11 +23,9 @@ from pendmap.units import Units
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from pendmap.charts.marks import Floats
     from pendmap.comparison import Comparison
     from pendmap.comparison.forced import Statistic
 
-    Pair = tuple[str, str]
     Compared = RunComparison | ForcedComparison
 
 ALL: Final = 3  # Number of runs up to which each has a row
@@ -43,15 +41,10 @@ HELD: Final = "#d55e00"
 NAMED: Final = 40  # Greatest number of runs named below a panel
 DOTS: Final = 6_000  # Greatest number of readings of a decay drawn
 SAMPLES: Final = 20_000  # Greatest number of samples of a curve drawn
-WELLS: Final = 14  # Number of wells up to which each has a band
-WELL, ENSEMBLE = "#f0f0f0", "#9ecae1"
-"""Colours of every other well, and of an ensemble."""
+ENSEMBLE: Final = "#9ecae1"  # Colour of an ensemble
 EVERY: Final = 3  # Step between the drawn samples of a measured cycle
 BINS: Final = 24  # Bins of a histogram of an ensemble
 TALL: Final = 0.36  # Height of a histogram over that of its row
-PAIR: Final = ("record", "model")
-OF_PAPER: Final = ("virtual rig", "identified model")
-"""Names of record and model in a comparison, and in the paper's figures."""
 _SI: Final = Units(si=True)
 
 
@@ -124,20 +117,15 @@ def _free(one: RunComparison) -> list[Panel]:
 def _over_record(one: RunComparison) -> Panel:
     run, sensor = one.run, one.run.accelerometer
     # The model's reading; the sensor's own errors appear in the residual alone.
-    if sensor is not None:
-        readings = sensor.gain * as_angles(run)
-        angle = readings - sensor.gain * one.residual
-    else:
-        readings = run.theta
-        # A gyroscope reads no angle.
-        angle = readings - one.residual if run.rod_sensor is None else one.curve[0]
+    readings = run.theta if sensor is None else sensor.gain * as_angles(run)
+    angle = readings - one.residual * (1.0 if sensor is None else sensor.gain)
+    if sensor is None and run.rod_sensor is not None:  # a gyroscope reads no angle
+        angle = one.curve[0]
     shown, made = (np.where(run.trusted, values, np.nan) for values in (readings, angle))
     some = slice(None, None, max(1, run.time.size // DOTS))
-    dots: dict[str, Any] = {"colour": MEASURED, "size": 1.5, "name": PAIR[0]}
-    line: dict[str, Any] = {"colour": look(MODEL).colour, "width": 0.7, "name": PAIR[1]}
     marks: list[Mark] = [
-        Points(run.time[some], shown[some], **dots),
-        Line(run.time[some], made[some], **line),
+        Points(run.time[some], shown[some], colour=MEASURED, size=1.5, name="record"),
+        Line(run.time[some], made[some], colour=look(MODEL).colour, width=0.7, name="model"),
     ]
     up = names.angle(holding(shown))
     if sensor is not None:
@@ -151,19 +139,15 @@ def _forced(one: ForcedComparison) -> list[Panel]:
         third = phase(one, member="a member of the ensemble")
     else:
         third = cycles(one, one.steady.measured.name)
-    return [history(one, PAIR), phase(one), third, statistics(one)]
+    return [history(one), phase(one), third, statistics(one)]
 
 
-def history(one: ForcedComparison, pair: Pair = OF_PAPER, *, member: str = "") -> Panel:
-    """Return the angle in turns against time, of the record or a member; wells are bands."""
+def history(one: ForcedComparison, *, member: str = "") -> Panel:
+    """Return the angle in turns against time, of the record or a member."""
     reading, colour = (one.example[0], look(MODEL).colour) if member else (one.measured, MEASURED)
     turns, every = reading / math.tau, max(1, one.time.size // SAMPLES)
-    low, high = math.floor(turns.min() + 0.5), math.ceil(turns.max() - 0.5)
-    line: dict[str, Any] = {"colour": colour, "width": 0.6, "name": pair[bool(member)]}
+    line: dict[str, Any] = {"colour": colour, "width": 0.6, "name": "model" if member else "record"}
     marks: list[Mark] = [Line(one.time[::every], turns[::every], **line)]
-    if high - low < WELLS:
-        wells = [(well - 0.5, well + 0.5) for well in range(low, high + 1, 2)]
-        marks.append(Span(wells, axis="y", colour=WELL, name="every other well"))
     up = Axis("θ/2π (turns)", holding(turns, margin=0.08))
     clock = Axis(names.TIME, (float(one.time[0]), float(one.time[-1])))
     return Panel("history", member or "record", clock, up, marks)
@@ -180,7 +164,7 @@ def phase(one: ForcedComparison, *, member: str = "") -> Panel:
     return Panel("phase", member or "record", *sides, [Line(*curve.T, colour=colour, width=0.4)])
 
 
-def cycles(one: ForcedComparison, title: str, pair: Pair = PAIR) -> Panel:
+def cycles(one: ForcedComparison, title: str) -> Panel:
     """Return the steady state of a record as points, and that of the model as a line."""
     result, model = one.steady, look(MODEL)
     marks: list[Mark] = []
@@ -190,24 +174,22 @@ def cycles(one: ForcedComparison, title: str, pair: Pair = PAIR) -> Panel:
         speeds = np.concatenate([cycle.velocity for cycle in every])
         if result.measured.w == 0:
             reach = 1.08 * max(float(np.abs(cycle.theta).max()) for cycle in every)
-        some = slice(None, None, EVERY)
-        at = plane.wrapped(result.measured.theta)[some], result.measured.velocity[some]
-        circle: dict[str, Any] = {"fill": "none", "size": 4.0, "edge_width": 0.8}
-        marks = [Points(*at, colour=MEASURED, name=pair[0], **circle)]
+        at = plane.wrapped(result.measured.theta), result.measured.velocity
+        circle: dict[str, Any] = {"fill": "none", "size": 4.0, "edge_width": 0.8, "name": "record"}
+        marks = [Points(at[0][::EVERY], at[1][::EVERY], colour=MEASURED, **circle)]
         if result.model is not None:
             theta, velocity = result.model.theta, result.model.velocity
             theta = np.append(theta, theta[0] + math.tau * result.model.w)
             curve = plane.broken_at_wrap(theta, np.append(velocity, velocity[0]))
-            marks.append(Line(*curve.T, colour=model.colour, width=1.2, name=pair[1]))
-    sides = names.phase_plane((-reach, reach), plane.padded(speeds), _SI)
+            marks.append(Line(*curve.T, colour=model.colour, width=1.2, name="model"))
+    sides = names.phase_plane((-reach, reach), holding(speeds), _SI)
     return Panel(f"cycles {one.run.name}", title, *sides, marks)
 
 
 def statistics(one: ForcedComparison) -> Panel:
     """Return one row per statistic: the ensemble's histogram, and the record's value as a line."""
     marks: list[Mark] = []
-    for k, item in enumerate(one.statistics):
-        base = k + 1.0
+    for base, item in enumerate(one.statistics, 1):
         mine, low, high = (written(item, value, 3) for value in (item.measured, *item.ci95))
         unit = f" {item.unit}" if item.unit and math.isfinite(item.ci95[0]) else ""
         text = f"{item.name} {mine} ({low if low == high else f'{low} to {high}'}){unit}"
@@ -218,33 +200,31 @@ def statistics(one: ForcedComparison) -> Panel:
 
 
 def _histogram(one: Statistic, base: float) -> list[Mark]:
-    known = one.ensemble[np.isfinite(one.ensemble)]
-    ends = np.append(known, one.measured if math.isfinite(one.measured) else known[:0])
-    low, high = (float(ends.min()), float(ends.max())) if ends.size else (0.0, 1.0)
-    wide = high - low or 1.0
-    whole = not one.unit and wide < BINS
-    edges = np.arange(low - 0.5, high + 1) if whole else np.linspace(low, low + wide, BINS + 1)
-    counts, edges = np.histogram(known, edges)
-    never = one.ensemble.size - known.size
-    unit = TALL / max(counts.max(initial=0), never, 1)
-    places = 0.9 * (edges - edges[0]) / (edges[-1] - edges[0])
-    columns = zip(places[:-1], places[1:], counts, strict=True)
-    made = [_column(left, right, base, unit * n) for left, right, n in columns if n]
-    marks: list[Mark] = [Areas(made, colour=ENSEMBLE, name="ensemble")]
-    if never:
-        last, name = [_column(0.95, 1.0, base, unit * never)], "not settled by the end"
-        marks.append(Areas(last, colour=ENSEMBLE, name=name))
-        marks.append(Areas(last, colour="#ffffff", hatch="////", name=name))
-    marks.append(Line(np.array([0.0, 1.0]), np.full(2, base), colour=QUIET, width=0.6))
-    at = 0.975
-    if math.isfinite(one.measured):
-        at = 0.9 * (one.measured - edges[0]) / (edges[-1] - edges[0])
-    up = np.array([base, base - TALL])
-    return [*marks, Line(np.full(2, at), up, colour=MEASURED, width=1.6)]
-
-
-def _column(left: float, right: float, base: float, high: float) -> Floats:
-    return np.array([(left, base), (right, base), (right, base - high), (left, base - high)])
+    """Return a histogram; members not settled by the end are a hatched column at the right."""
+    every = np.append(one.ensemble, one.measured)
+    known = every[np.isfinite(every)]
+    low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
+    whole = not one.unit and high - low < BINS
+    edges = np.arange(low - 0.5, high + 1) if whole else np.linspace(low, high, BINS + 1)
+    wide = (edges[-1] - edges[0]) * (1 + 1e-9) or 1.0  # the last value is in the last column
+    place = np.where(np.isfinite(every), 0.9 * (every - edges[0]) / wide, 0.975)
+    counts, ends = np.histogram(place[:-1], [*np.linspace(0.0, 0.9, edges.size), 0.95, 1.0])
+    tall = base - TALL * counts / max(counts.max(), 1)
+    columns = [
+        np.array([(left, base), (right, base), (right, up), (left, up)])
+        for left, right, up in zip(ends[:-1], ends[1:], tall, strict=True)
+        if up < base
+    ]
+    marks: list[Mark] = [Areas(columns, colour=ENSEMBLE, name="ensemble")]
+    if counts[-1]:
+        look: dict[str, Any] = {"name": "not settled by the end"}
+        marks.append(Areas(columns[-1:], colour=ENSEMBLE, **look))
+        marks.append(Areas(columns[-1:], colour="#ffffff", hatch="////", **look))
+    return [
+        *marks,
+        Line(np.array([0.0, 1.0]), np.full(2, base), colour=QUIET, width=0.6),
+        Line(np.full(2, place[-1]), np.array([base, base - TALL]), colour=MEASURED, width=1.6),
+    ]
 
 
 # Figures 8 and 9 of the paper.
@@ -252,18 +232,15 @@ def _column(left: float, right: float, base: float, high: float) -> Floats:
 
 def steady(runs: Sequence[ForcedComparison], title: str, subtitle: str) -> Chart:
     """Return a phase plane for each run: the record as points, the model as a line."""
-    panels = [cycles(one, f"{_drive(one)}: {_reached(one)}", OF_PAPER) for one in runs]
+    panels = [cycles(one, f"{_drive(one)}: {_reached(one)}") for one in runs]
     rows = [panels[k : k + 2] for k in range(0, len(panels), 2)]
-    size = (0.7 * WIDTH, 3.3 * len(rows) + 1.2)
-    return Chart(title, subtitle, rows, columns=2, size=size)
+    return Chart(title, subtitle, rows, size=(0.7 * WIDTH, 3.3 * len(rows) + 1.2))
 
 
 def _reached(one: ForcedComparison) -> str:
     result = one.steady
-    if result is None:
-        return "no steady state"
-    if result.model is None:
-        return f"{result.measured.name}, not that of the model"
+    if result is None or result.model is None:
+        return f"{result.measured.name}, not that of the model" if result else "no steady state"
     return f"{result.measured.name}, amplitude of the model {100 * result.overestimate:+.2g} %"
 
 

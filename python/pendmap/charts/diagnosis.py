@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
 from pendmap.charts import names
-from pendmap.charts.chart import Axis, Chart, Panel, Sheet, holding
-from pendmap.charts.identification import errors_of
+from pendmap.charts.chart import Axis, Chart, Panel, holding
+from pendmap.charts.identification import error_panels
 from pendmap.charts.marks import QUIET, Areas, Band, Level, Line, Mark, Points, Span, bars
-from pendmap.charts.methods import NOISE, look
+from pendmap.charts.palette import NOISE, look
 from pendmap.model.labels import unit_of
 from pendmap.signal.robust import Z95
 
@@ -73,18 +71,21 @@ def parts(result: Discrepancy) -> dict[str, Chart]:
     starts = " and ".join(f"{one.starts} {one.kind}" for one in result.forecasts)
     forecasts = f"forecasts from {starts} starts on what was held out" if starts else ""
     gap = [by_run(result), *(forecast(result, one) for one in result.forecasts)]
-    torques = _torques(result)
+    torques = [torque(result, over) for over in OVER_SAID if _torque_rows(result, over)]
     pairs = [torques[k : k + 2] for k in range(0, len(torques), 2)]
     ranked = [ranking(result)] if result.scores.best() else []
     by_itself = "what each effect of the library would explain by itself"
     runs = [coefficients(result, name) for name in shown_coefficients(result)]
     worst = "the runs with the largest residuals of the baseline"
+    cycles = _cycles(result)
+    first_peak = "from the first measured peak on"
     made = {
         "residuals": ("Residuals", worst, [[panel] for panel in residuals(result)], 4.2),
         "gap": ("The gap", forecasts, [gap], 3.7),
         "torque": (LACKED, "per moment of inertia; bands: 95 %", pairs, 1.1 + 2.3 * len(pairs)),
         "ranking": ("Ranking", by_itself, [ranked], 3.5),
         "runs": ("Run by run", "bars and band: 95 %", [runs], 3.5),
+        "figure_7": ("Simulated periods and peaks", first_peak, cycles, 1.1 + 2.6 * len(cycles)),
     }
     return {
         name: Chart(title, text, rows, size=(SIZE[0], high), letters=False)
@@ -93,18 +94,16 @@ def parts(result: Discrepancy) -> dict[str, Chart]:
     }
 
 
-def cycles(result: Discrepancy) -> Sheet | None:
-    """Return the errors of simulated periods and peaks of both models, for each free run."""
-    runs = sorted(result.cycles, key=lambda one: (not one.held_out, -len(one.peaks)))[:CYCLES]
-    charts = []
-    for one in runs:
-        errors = one.errors
+def _cycles(result: Discrepancy) -> list[list[Panel]]:
+    """Return the errors of simulated periods and peaks of the models, a row for each free run."""
+    rows = []
+    for one in sorted(result.cycles, key=lambda one: (not one.held_out, -len(one.peaks)))[:CYCLES]:
+        errors, name = one.errors, one.name + (", held out" if one.held_out else "")
         if not result.adds:
             errors = {"baseline": errors["before"]} if "before" in errors else {}
-        title = one.name + (", held out" if one.held_out else "")
-        charts.append(dataclasses.replace(errors_of(errors, one.peaks, title), size=(8.6, 3.0)))
-    text = "from the first measured peak on"
-    return Sheet("Simulated periods and peaks", text, [charts]) if charts else None
+        titles = (f"{name}: each period", "each peak; time runs to the left")
+        rows += [error_panels(errors, one.peaks, titles)] if errors else []
+    return rows
 
 
 def _title(result: Discrepancy) -> str:
@@ -128,38 +127,30 @@ def residuals(result: Discrepancy) -> list[Panel]:
     rows = [row for row in result.gap.by_run if not row.held_out]
     order = sorted(range(len(runs)), key=lambda k: -rows[k].before / rows[k].noise_floor)[:RUNS]
     longest = max(float(runs[k].time[-1]) for k in order)
+    fits = (result.base.fitted.fit, result.best.fitted.fit)
     panels = []
     for k in sorted(order):
         run = runs[k]
         interval = float(np.median(np.diff(run.time)))
-        every = max(round(PART * math.tau / (result.base.fitted.fit.model.w0 * interval)), 1)
+        every = max(round(PART * math.tau / (fits[0].model.w0 * interval)), 1)
         time = run.time[::every]
         floor = 2e3 * rows[k].noise_floor / math.sqrt(every)
         text = "noise, 2 standard errors"
         marks: list[Mark] = [Span((-floor, floor), axis="y", colour=NOISE, name=text)]
         shown = [np.array([-floor, floor])]
-        fits = (result.base.fitted.fit, result.best.fitted.fit)
         for (name, colour), fit in zip(models(result), fits, strict=False):
-            residual = 1e3 * fit.residuals[k]
-            if run.trusted is not None:
-                residual = np.where(run.trusted, residual, math.nan)
-            mean = _smoothed(residual, every)[: time.size]
+            used = True if run.trusted is None else run.trusted
+            residual = np.where(used, 1e3 * fit.residuals[k], math.nan)
+            bins = np.pad(residual, (0, -residual.size % every), constant_values=math.nan)
+            bins = bins.reshape(-1, every)
+            count = np.isfinite(bins).sum(axis=1)
+            mean = np.where(count > 0, np.nansum(bins, axis=1) / np.maximum(count, 1), math.nan)
             marks.append(Line(time, mean, colour=colour, width=1.0, name=name))
             shown.append(mean)
         across = Axis("time (s)" if k == max(order) else "", (min(0.0, float(time[0])), longest))
         title = f"{run.name}: record less model, means over a tenth of a swing"
         panels.append(Panel(f"residual {k}", title, across, Axis("mrad", holding(*shown)), marks))
     return panels
-
-
-def _smoothed(residual: Floats, every: int) -> Floats:
-    """Return means over ``every`` samples; NaN for a bin without samples."""
-    rows = np.pad(residual, (0, -residual.size % every), constant_values=math.nan)
-    rows = rows.reshape(-1, every)
-    known = np.isfinite(rows)
-    count = known.sum(axis=1)
-    total = np.where(known, rows, 0.0).sum(axis=1)
-    return np.where(count > 0, total / np.maximum(count, 1), math.nan)
 
 
 def _runs(files: Sequence[str]) -> Axis:
@@ -196,58 +187,43 @@ def forecast(result: Discrepancy, one: Forecast) -> Panel:
     """Return the forecast error against the horizon, with the noise."""
     floor = 1e3 * one.noise_floor
     marks: list[Mark] = [Level(floor, width=1.1, name="noise", path="noise")]
-    shown: list[npt.ArrayLike] = [floor]
-    for (name, colour), error in zip(models(result), (one.before, one.after), strict=False):
-        path = "before" if name == "baseline" else name
-        line = 1e3 * error
-        marks.append(Line(one.horizon, line, colour=colour, width=1.4, name=name, path=path))
-        shown.append(line)
+    errors = [1e3 * one.before, 1e3 * one.after][: len(models(result))]
+    for (name, colour), error in zip(models(result), errors, strict=True):
+        marks.append(Line(one.horizon, error, colour=colour, width=1.4, name=name, path=name))
     across = Axis("time ahead (s)", (0.0, float(one.horizon[-1])))
-    title = f"Error of forecasts, {one.kind} runs"
+    title, up = f"Error of forecasts, {one.kind} runs", names.sizes(RMS, floor, *errors)
     root = f"forecast/{one.kind}"
-    up = names.sizes(RMS, *shown)
     return Panel(f"forecast {one.kind}", title, across, up, marks, root=root)
 
 
 def _torque_rows(result: Discrepancy, over: str) -> list[list[dict[str, Any]]]:
-    """Return the torque bins of both models; empty if there are none."""
-    torques = (result.torque_before, result.torque_after)
-    both = zip(models(result), torques, strict=False)
-    rows = [torque.rows.get(over, []) for _, torque in both]
+    """Return the torque bins of the models; empty if there are none."""
+    torques = (result.torque_before, result.torque_after)[: len(models(result))]
+    rows = [torque.rows.get(over, []) for torque in torques]
     return rows if any(rows) else []
 
 
 def torque(result: Discrepancy, over: str) -> Panel:
-    """Return the missing torque of both models over one quantity, with 95 % bands."""
+    """Return the missing torque of the models over one quantity, with 95 % bands."""
     marks: list[Mark] = [Level(0.0, colour=QUIET, path="zero")]
-    every: list[dict[str, Any]] = []
-    shown = [np.zeros(1)]
-    for (name, colour), mine in zip(models(result), _torque_rows(result, over), strict=False):
-        if not mine:
+    shown, bins, text = [np.zeros(1)], [], "torque"
+    for (name, colour), rows in zip(models(result), _torque_rows(result, over), strict=False):
+        if not rows:
             continue
-        every += mine
-        path = "before" if name == "baseline" else name
-        edges = np.array([mine[0]["from"], *(row["to"] for row in mine)])
-        value, error = (np.array([row[key] for row in mine]) for key in ("torque", "stderr"))
-        low, high, line = (
-            np.append(v, v[-1]) for v in (value - Z95 * error, value + Z95 * error, value)
-        )
+        bins.append(np.array([rows[0]["from"], *(row["to"] for row in rows)]))
+        text = "torque along\nthe motion" if rows[0]["along_motion"] else "torque"
+        value, error = (np.array([row[key] for row in rows]) for key in ("torque", "stderr"))
+        value, error = np.append(value, value[-1]), np.append(error, error[-1])
+        shown += [value - Z95 * error, value + Z95 * error]
+        look: dict[str, Any] = {"colour": colour, "step": True}
         marks += [
-            Band(edges, low, high, colour=colour, alpha=0.25, step=True, path=f"{path}/bars"),
-            Line(edges, line, colour=colour, width=1.3, step=True, name=name, path=path),
+            Band(bins[-1], *shown[-2:], alpha=0.25, path=f"{name}/bars", **look),
+            Line(bins[-1], value, width=1.3, name=name, path=name, **look),
         ]
-        shown += [low, high]
-    ends = (min(r["from"] for r in every), max(r["to"] for r in every)) if every else (0.0, 1.0)
-    along = bool(every) and every[0]["along_motion"]
-    text = "torque along\nthe motion" if along else "torque"
     title = f"{LACKED}, over {over.replace('_', ' ')}"
+    across = Axis(OVER_SAID[over], holding(*bins, margin=0.0) if bins else None)
     up = Axis(f"{text} ({ACCELERATION})", holding(*shown))
-    return Panel(over, title, Axis(OVER_SAID[over], ends), up, marks, root=f"torque/{over}")
-
-
-def _torques(result: Discrepancy) -> list[Panel]:
-    """Return the missing torque over each quantity that has bins."""
-    return [torque(result, over) for over in OVER_SAID if _torque_rows(result, over)]
+    return Panel(over, title, across, up, marks, root=f"torque/{over}")
 
 
 def ranking(result: Discrepancy) -> Panel:
@@ -300,46 +276,37 @@ def _together(result: Discrepancy, shown: str) -> tuple[float, float]:
     return estimate.value - half, estimate.value + half
 
 
-def _reach(result: Discrepancy, shown: str) -> tuple[float, float]:
-    """Return the limits of the axis; a run that hardly determines the effect is cut off."""
-    mean = result.nearest.fitted.fit.estimates[shown].value
-    known = [(v, e) for v, e in result.runs.coefficients[shown] if math.isfinite(e)]
-    errors = sorted(e for _, e in known)
-    reach = 6 * errors[len(errors) // 2] if errors else 0.0
-    spread = max((abs(v - mean) for v, e in known if e < reach), default=0.0)
-    wide = max(abs(end - mean) for end in _together(result, shown))
-    half = max(1.4 * spread, reach, 1.5 * wide) or 1.0
-    return mean - half, mean + half
-
-
 def coefficients(result: Discrepancy, shown: str) -> Panel:
-    """Return the value of a parameter from each run, and from all runs together."""
-    pairs = result.runs.coefficients[shown]
+    """Return the value of a parameter from each run, and from all runs together.
+
+    The axis contains the interval of all runs together, and runs of which at least half have a
+    smaller error; others are marked at its ends.
+    """
     mean = result.nearest.fitted.fit.estimates[shown].value
     power = 3 * math.floor(math.log10(abs(mean)) / 3) if mean else 0
-    scale = 10.0**-power
-    at = np.arange(len(pairs), dtype=float)
-    value, error = (scale * np.array([pair[k] for pair in pairs]) for k in (0, 1))
+    pairs = 10.0**-power * np.array(result.runs.coefficients[shown], dtype=float)
+    at, (value, error) = np.arange(len(pairs), dtype=float), pairs.T
+    together = [10.0**-power * end for end in _together(result, shown)]
     known = np.isfinite(error)
-    low, high = (scale * end for end in _reach(result, shown))
+    reach = 6 * float(np.median(error[known])) if known.any() else 0.0
     least, most = value - Z95 * error, value + Z95 * error
-    together = [scale * end for end in _together(result, shown)]
+    sure = known & (error < reach)
+    around = 10.0**-power * mean + np.array([-reach, reach])
+    low, high = holding(together, around, least[sure], most[sure])
     marks: list[Mark] = [
         Span(together, axis="y", colour=NOISE, name="all together"),
         Line(*bars(at[known], least[known], most[known]), colour=AFTER, width=1.0),
         Points(at[known], value[known], marker="s", size=4.0, colour=AFTER, name="own value"),
     ]
-    inner = high - low
     for which, place, mark, text in (
-        (known & (most > high), high - 0.03 * inner, "^", "beyond the axis"),
-        (known & (least < low), low + 0.03 * inner, "v", "beyond the axis"),
-        (~known, low + 0.06 * inner, "x", "undetectable"),
+        (known & (most > high), 0.97, "^", "beyond the axis"),
+        (known & (least < low), 0.03, "v", "beyond the axis"),
+        (~known, 0.06, "x", "undetectable"),
     ):
-        x = at[which]
-        if x.size:
-            spots = np.full(x.size, place)
+        if which.any():
+            spots = np.full(np.count_nonzero(which), low + place * (high - low))
             cross: dict[str, Any] = {"marker": mark, "size": 4.5, "edge_width": 1.0}
-            marks.append(Points(x, spots, colour=QUIET, name=text, **cross))
+            marks.append(Points(at[which], spots, colour=QUIET, name=text, **cross))
     times = f"$10^{{{power}}}$ " if power else ""
     unit = f"{times}{unit_of(shown, result.definition)}".strip()
     mine = shown.rpartition(".")[2]

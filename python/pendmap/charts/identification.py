@@ -10,33 +10,30 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.analysis.trajectory import simulate
-from pendmap.charts import decrement, half_cycles, names
-from pendmap.charts.chart import Axis, Chart, Panel, Sheet, bare, holding
+from pendmap.charts import half_cycles, names
+from pendmap.charts.chart import Axis, Chart, Panel, Sheet, bare, holding, nothing
 from pendmap.charts.marks import QUIET, Band, Level, Line, Mark, Points, Table, Text
-from pendmap.charts.methods import MEASURED, NOISE, NOISE_SAID, drawn, look, nothing
+from pendmap.charts.palette import MEASURED, NOISE, NOISE_SAID, drawn, look
 from pendmap.errors import InputError
 from pendmap.formatting import estimate_text, typographic
 from pendmap.identification.methods.registry import BEST
 from pendmap.identification.report import table1_table
+from pendmap.identification.table1 import first_state, simulated_peaks
 from pendmap.signal.robust import Z95, span
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from pendmap.charts.half_cycles import Course
     from pendmap.charts.marks import Ends, Floats
     from pendmap.identification import IdentificationReport, PeakErrors, Peaks
     from pendmap.model import Rig
     from pendmap.records import Run
 
 WIDTH: Final = 8.6  # Width of a column, inches
-NEAR: Final = 5  # Number of half cycles of the close views
 SAMPLES: Final = 64  # Samples per swing of a simulation
 MOST: Final = 6_000  # Greatest number of residuals drawn
-DOTS: Final = 150  # Greatest number of readings drawn in a close view
 LINE: Final = 0.2  # Height of a row of the table, inches
 LETTERS: Final = 110  # Letters per line below the table
-RESTS: Final = "at rest"  # Entry for an error if the simulation has already come to rest
 NOTHING: Final = "no method can be applied, or there are fewer than three peaks"
 QUANTITIES: Final = {"w0": "w0 (rad/s)", "c_over_m": "c/m (1/s)", "Tr": "Tr (rad/s²)"}
 """Estimates in the table, with the heads of their columns."""
@@ -45,46 +42,39 @@ QUANTITIES: Final = {"w0": "w0 (rad/s)", "c_over_m": "c/m (1/s)", "Tr": "Tr (rad
 def sheet(
     report: IdentificationReport,
     *,
-    parts: Sequence[str] | None = None,
+    parts: Sequence[str] = (),
     title: str | None = None,
     subtitle: str | None = None,
 ) -> Sheet:
-    """Return the parts in one column, or more than two in two columns of nearly equal height."""
-    wanted = list(PARTS) if parts is None else list(parts)
-    unknown = [name for name in wanted if name not in PARTS]
-    if unknown or not wanted:
-        what = repr(unknown[0]) if unknown else "nothing"
-        raise InputError(f"parts must be among {', '.join(PARTS)}, got {what}")
-    charts = [make(report) for name, make in PARTS.items() if name in wanted]
+    """Return the parts, by default all, in one column, or more than two in two columns."""
+    for name in parts:
+        if name not in PARTS:
+            raise InputError(f"parts must be among {', '.join(PARTS)}, got {name!r}")
+    charts = [PARTS[name](report) for name in parts or PARTS]
     if title is not None and len(charts) == 1:
         charts = [dataclasses.replace(charts[0], title="")]
+    high = np.cumsum([0.0, *(chart.size[1] for chart in charts if chart.size)])
     columns = [charts]
     if len(charts) > 2:  # noqa: PLR2004
-        high = np.cumsum([0.0, *(chart.size[1] for chart in charts if chart.size)])
         k = min(range(1, len(charts)), key=lambda k: max(high[k], high[-1] - high[k]))
         columns = [charts[:k], charts[k:]]
     run, peaks = report.run, report.peaks
-    noise = (
-        f"{len(peaks)} peaks, {f'noise {peaks.sigma:.2g} rad' if peaks.sigma else 'no noise seen'}"
-    )
-    used = f"{run.trusted.sum()} of {run.time.size} samples for fitting"
-    text = f"{run.rate_hz:.5g} Hz, {span(run.time)}, {used};   {noise}"
-    if run.peaks_only:
-        text = f"{len(peaks)} peaks, {span(run.time)}"
-    elif len(report.runs) > 1:
+    noise = f"noise {peaks.sigma:.2g} rad" if peaks.sigma else "no noise seen"
+    text = f"{len(peaks)} peaks, {span(run.time)}"
+    if len(report.runs) > 1:
         fitted = f"fitted to {len(report.runs)} runs; drawn: {run.name}, the longest"
-        text = f"{fitted};   {span(run.time)}, {noise}"
+        text = f"{fitted};   {text}, {noise}"
+    elif not run.peaks_only:
+        used = f"{run.trusted.sum()} of {run.time.size} samples for fitting"
+        text = f"{run.rate_hz:.5g} Hz, {used};   {text}, {noise}"
     return Sheet(
         title or f"Identification: {run.name}", text if subtitle is None else subtitle, columns
     )
 
 
-# Decay of each model with the measured one: figure 6.
-
-
 @dataclasses.dataclass(frozen=True)
 class Decay:
-    """A model simulated from the first peak of a record, with the sensor's zero error: s, rad."""
+    """A model simulated from the first peak of a record (figure 6), with the zero error."""
 
     peak_time: Floats
     peak: Floats
@@ -94,8 +84,10 @@ class Decay:
     @classmethod
     def of(cls, rig: Rig, peaks: Peaks, zero: float) -> Decay:
         """Return the simulation of a model whose sensor has a zero error, rad."""
-        begun, peak_time, peak = decrement.from_first_peak(rig, peaks, zero)
-        until = max(float(peaks.turned.time[-1]) - begun.time, 1e-3) * 1.01
+        first, last = first_state(peaks), float(peaks.turned.time[-1])
+        begun = dataclasses.replace(first, theta=first.theta - zero)
+        peak_time, peak = simulated_peaks(rig, begun, last)
+        until = max(last - begun.time, 1e-3) * 1.01
         run = simulate(rig, begun.theta, 0.0, until, samples=SAMPLES)
         time, theta = run["time"].values + begun.time, run["theta"].values + zero
         return cls(peak_time, peak + zero, time, theta)
@@ -121,7 +113,7 @@ def _line(x: Floats, y: Floats, method: str, width: float) -> Line:
 
 
 def decays(report: IdentificationReport) -> Chart:
-    """Return peaks, their differences, close views and residuals of every model."""
+    """Return peaks and their differences of every model, and residuals of the fitted one."""
     title = "The decay by each model"
     made, run, turned = simulated(report), report.run, report.peaks.turned
     last = []
@@ -130,19 +122,13 @@ def decays(report: IdentificationReport) -> Chart:
         last = [residuals(run, joint.fit.residuals[0], sigma, BEST, text)]
     if not made:
         chart = nothing(title, report.table.left_out or NOTHING)
-        if not (report.table.left_out and last):
-            return chart
-        return dataclasses.replace(chart, rows=[*chart.rows, last], size=(WIDTH, 2.6))
+        two = dataclasses.replace(chart, rows=[*chart.rows, last], size=(WIDTH, 2.6))
+        return two if last else chart
     ends = holding(turned.time, margin=0.01)
-    course = half_cycles.course_of(run, report.peaks)
-    spans = half_cycles.first_and_last(turned, NEAR)
-    titles = ("the beginning", "the end") if len(spans) > 1 else ("the angle",)
-    pairs = zip(titles, spans, strict=True)
-    near = [_near(course, made, *one, only=run.peaks_only) for one in pairs]
-    shown = [[_envelope(turned, made, ends)], [_differences(turned, made, ends)], near]
-    shown += [last] if last else []
-    heights = (1.7, 1.35, 1.5, 0.75)[: len(shown)]
-    return Chart(title, "", shown, heights=heights, size=(WIDTH, 6.3 + 1.3 * len(last)))
+    shown = [[_envelope(turned, made, ends)], [_differences(turned, made, ends)], last]
+    shown = [row for row in shown if row]
+    heights = (1.7, 1.35, 0.75)[: len(shown)]
+    return Chart(title, "", shown, heights=heights, size=(WIDTH, 4.6 + 1.3 * len(last)))
 
 
 def _envelope(turned: Peaks, made: Mapping[str, Decay], ends: Ends) -> Panel:
@@ -179,25 +165,6 @@ def _noise(x: Floats, error: Floats) -> list[Mark]:
     return [Band(x, -error, error, colour=NOISE, order=0.0, name=name)]
 
 
-def _near(
-    course: Course, made: Mapping[str, Decay], title: str, ends: Ends, *, only: bool
-) -> Panel:
-    inside = np.flatnonzero((course.time >= ends[0]) & (course.time <= ends[1]))
-    inside = inside[:: 1 if only else max(1, inside.size // DOTS)]
-    time, theta = course.time[inside], course.theta[inside]
-    size = 4.0 if only else 1.5
-    marks: list[Mark] = [Points(time, theta, colour=MEASURED, size=size, order=5.0)]
-    values = [theta]
-    for name, one in made.items():
-        shown = (one.time >= ends[0]) & (one.time <= ends[1])
-        marks.append(_line(one.time[shown], one.theta[shown], name, 1.1))
-        values.append(one.theta[shown])
-    # A model that decays too slowly would flatten the measured swing to a line.
-    bound = 3.0 * float(np.abs(theta).max()) if theta.size else math.inf
-    up = names.angle(holding(np.clip(np.concatenate(values), -bound, bound)))
-    return Panel(title, title, Axis(names.TIME, ends), up, marks)
-
-
 def residuals(run: Run, residual: Floats, sigma: float, method: str, title: str) -> Panel:
     """Return the residuals of a model over a record, with lines at the standard deviation."""
     gyroscope = run.gyroscope
@@ -214,23 +181,14 @@ def residuals(run: Run, residual: Floats, sigma: float, method: str, title: str)
     return Panel("residual", title, names.seconds(run.time), Axis(unit, (-top, top)), marks)
 
 
-# Error of each simulated period and peak: figure 7.
-
-
 def errors(report: IdentificationReport) -> Chart:
     """Return the errors of periods and peaks of every model."""
     title, known = "Errors of simulated periods and peaks", report.table.errors
-    if report.table.left_out:
-        return nothing(title, report.table.left_out)
-    return errors_of({name: known[name] for name in drawn(known)}, report.peaks, title)
-
-
-def errors_of(known: Mapping[str, PeakErrors], peaks: Peaks, title: str) -> Chart:
-    """Return the errors of periods and peaks by model."""
-    if not known:
-        return nothing(title, NOTHING)
+    if report.table.left_out or not known:
+        return nothing(title, report.table.left_out or NOTHING)
+    shown = {name: known[name] for name in drawn(known)}
     titles = ("of each period", "of each peak; time runs to the left")
-    return Chart(title, "", [error_panels(known, peaks, titles)], size=(WIDTH, 3.6))
+    return Chart(title, "", [error_panels(shown, report.peaks, titles)], size=(WIDTH, 3.6))
 
 
 def error_panels(
@@ -259,15 +217,12 @@ def error_panels(
     return panels
 
 
-# Table 1.
-
-
 def table(report: IdentificationReport) -> Chart:
     """Return table 1 of a record, and below it the inapplicable methods with the reason."""
     head, errors = table1_table(report)
     heads = [] if report.table.left_out else head[1:]
     dash, of_method = "\N{EN DASH}", {name: cells for name, *cells in errors}
-    body, notes, reasons = [], [], []
+    body, reasons = [], []
     for name, method in report.methods.items():
         label = look(name).label
         if not method.applicable:
@@ -278,11 +233,8 @@ def table(report: IdentificationReport) -> Chart:
         cells = [dash if one is None else typographic(estimate_text(one)) for one in known]
         cells += [cell.removesuffix(" %") for cell in of_method.get(name, [dash] * len(heads))]
         body.append([label, *cells])
-    if body:
-        notes = ["in brackets: standard error of the last digits"]
-    if any(RESTS in row for row in body):
-        notes[0] += f";   {RESTS}: the simulation stands still by then"
-    notes += reasons
+    about = "in brackets: standard error of the last digits;   at rest: the simulation stands still"
+    notes = [about, *reasons] if body else reasons
     down = 2.5 + len(body)
     words = [
         Text(0.0, down + k, text, colour=QUIET, align=("left", "bottom"), size=8.0)
@@ -298,7 +250,7 @@ def table(report: IdentificationReport) -> Chart:
 
 PARTS: Final[dict[str, Callable[[IdentificationReport], Chart]]] = {
     "record": half_cycles.part,
-    "decrement": decrement.part,
+    "decrement": half_cycles.decrements,
     "decay": decays,
     "errors": errors,
     "table": table,

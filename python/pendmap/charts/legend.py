@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import math
 import operator
 import string
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,59 +24,44 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-@dataclass(frozen=True, eq=False)
+@dataclasses.dataclass(frozen=True, eq=False)
 class Entry:
     """One line of a legend.
 
-    ``id`` is 1 or more for an attractor, 0 for undecided and -1 for failed cells; ``fraction`` and
-    ``share`` are the share of the cells, in text with its standard error, ``twin`` the name of the
-    mirror twin, ``points``, shape (m, 2), the stroboscopic points: angle in rad, velocity;
-    ``chaotic`` says whether they are samples of a chaotic set rather than a periodic orbit.
+    ``id`` is 1 or more for an attractor, 0 for undecided and -1 for failed cells; ``text`` has its
+    name, its share of the cells with the standard error, and its mirror twin; ``points``, shape
+    (m, 2), are the stroboscopic points: angle in rad, velocity; ``chaotic`` says whether they are
+    samples of a chaotic set rather than a periodic orbit.
     """
 
     id: int
     name: str
+    text: str
     colour: str
-    marker: str
-    chaotic: bool
-    fraction: float
-    share: str
-    twin: str
-    points: npt.NDArray[np.float64]
-
-    @property
-    def text(self) -> str:
-        """Text of the line."""
-        twin = f", twin of {typeset(self.twin)}" if self.twin else ""
-        return f"{typeset(self.name)}, {self.share}{twin}"
+    marker: str = "s"
+    chaotic: bool = False
+    points: npt.NDArray[np.float64] = dataclasses.field(default_factory=lambda: np.empty((0, 2)))
 
 
 def entries(dataset: xr.Dataset) -> list[Entry]:
     """Return the attractors of a map, then undecided and failed cells if there are any."""
-    names = {
-        int(i): str(name)
-        for i, name in zip(dataset["id"].values, dataset["attractor"].values, strict=True)
-    }
-    owner = dataset["point_attractor"].values
-    points = plane.points(dataset)
+    names = dict(zip(dataset["id"].values.tolist(), dataset["attractor"].values, strict=True))
+    owner, points = dataset["point_attractor"].values, plane.points(dataset)
+    columns = (dataset[name].values for name in ("fraction", "stderr", "twin"))
+    rows = zip(names, attractors_of(dataset), colours_of(dataset), *columns, strict=True)
     listed = []
-    looks = zip(names.items(), attractors_of(dataset), colours_of(dataset), strict=True)
-    for k, ((i, name), one, colour) in enumerate(looks):
-        row = dataset.isel(attractor=k)
-        twin = int(row["twin"])
-        other = names.get(twin, "") if twin != i else ""
-        fraction, mine = float(row["fraction"]), points[owner == i]
-        share = percent(fraction, float(row["stderr"]))
+    for i, one, colour, share, error, twin in rows:
+        text = f"{typeset(str(names[i]))}, {percent(float(share), float(error))}"
+        if twin != i and twin in names:
+            text += f", twin of {typeset(str(names[twin]))}"
         look = (colour, palette.marker(one), one.chaotic)
-        listed.append(Entry(i, name, *look, fraction, share, other, mine))
+        listed.append(Entry(i, str(names[i]), text, *look, points[owner == i]))
     if dataset.attrs.get("layers") == "finite_time" and not listed:
         return listed
-    none = np.empty((0, 2))
     for i, name, colour in ((0, "undecided", palette.UNDECIDED), (-1, "failed", palette.FAILED)):
-        share_of = float(facts(dataset).get(name, 0.0))
-        if share_of > 0:
-            look = (colour, "s", False)
-            listed.append(Entry(i, name, *look, share_of, percent(share_of), "", none))
+        share = float(facts(dataset).get(name, 0.0))
+        if share > 0:
+            listed.append(Entry(i, name, f"{name}, {percent(share)}", colour))
     return listed
 
 
@@ -105,15 +90,12 @@ def with_looks(
     return dataset.assign(colour=(dim, chosen)).assign_coords({dim: renamed})
 
 
-def colours(dataset: xr.Dataset) -> npt.NDArray[np.uint8]:
-    """Return the colours of the labels -1, 0, 1, ..., K, in this order: shape (K + 2, 3)."""
-    ids = dataset["id"].values.astype(int)
-    table = np.empty((int(ids.max(initial=0)) + 2, 3), dtype=np.uint8)
-    table[:] = palette.parts(palette.UNNAMED)
-    table[0], table[1] = palette.parts(palette.FAILED), palette.parts(palette.UNDECIDED)
-    for i, colour in zip(ids, colours_of(dataset), strict=True):
-        table[i + 1] = palette.parts(colour)
-    return table
+def colours(dataset: xr.Dataset) -> dict[int, str]:
+    """Return the colours of the labels -1, 0, 1, ..., K, in this order."""
+    ids = dataset["id"].values.tolist()
+    mine = dict(zip(ids, colours_of(dataset), strict=True))
+    mine |= {-1: palette.FAILED, 0: palette.UNDECIDED}
+    return {k: mine.get(k, palette.UNNAMED) for k in range(-1, max(ids, default=0) + 1)}
 
 
 def percent(share: float, stderr: float = math.nan) -> str:

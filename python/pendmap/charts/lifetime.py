@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
 from pendmap.charts import names, palette
 from pendmap.charts.chart import Axis, Chart, Panel
@@ -31,16 +29,6 @@ _LEAST_SIGNIFICANT: Final = 0.05  # Significance level below which a tail is not
 _MARK: Final = (2.0, 2.0)  # Dash of the line at the start of the tail
 
 
-@dataclass(frozen=True, eq=False)
-class Curve:
-    """Share of all starts still alive after ``periods``; without a name, of all attractors."""
-
-    name: str
-    colour: str
-    periods: Floats
-    share: Floats
-
-
 def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> Chart:
     """Return survival curves with the fitted tail, and the mean time left by start of the tail."""
     del cells
@@ -60,72 +48,56 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     return Chart(title, subtitle, [panels], size=size).only(layer, (6.0, 4.6))
 
 
-def curves(dataset: xr.Dataset) -> list[Curve]:
-    """Return the curve of all starts, and of each attractor unless the bound cut many off."""
-    periods = dataset["elapsed"].values.astype(float)
-    captured = dataset["captured"].values
-    a = facts(dataset)
-    starts = int(a["starts"])
-    if a["persistent"]:
-        return [Curve("", INK, np.array([0.0, float(a["chaos_bound"])]), np.ones(2))]
-
-    def shares(count: npt.NDArray[np.int64]) -> Floats:
-        return np.where(count > 0, count / starts, np.nan)
-
+def _survival(dataset: xr.Dataset) -> Panel:
+    """Return the share of all starts still alive, and of each attractor if few are cut off."""
+    a, captured = facts(dataset), dataset["captured"].values
+    starts, periods = int(a["starts"]), dataset["elapsed"].values.astype(float)
     lasting = round(float(a["chaotic_share"]) * starts)
-    everything = starts - int(a["failed"]) - lasting - captured.sum(axis=0)
-    total = np.rint(dataset["fraction"].values * starts).astype(np.int64)
-    made = [Curve("", INK, periods, shares(everything))]
-    whole = int(a["censored"]) <= FEW * starts
-    names, colours = dataset["attractor"].values, colours_of(dataset)
-    for k in np.flatnonzero(captured.any(axis=1)) if whole else ():
-        alive = shares(total[k] - captured[k])
-        made.append(Curve(str(names[k]), palette.on_white(colours[k]), periods, alive))
-    return made
+    alive: list[tuple[str, str, Any]] = [
+        ("all starts", INK, starts - int(a["failed"]) - lasting - captured.sum(axis=0))
+    ]
+    if a["persistent"]:
+        periods = np.array([0.0, float(a["chaos_bound"])])
+        alive = [("all starts", INK, np.full(2, starts))]
+    elif int(a["censored"]) <= FEW * starts:
+        total = np.rint(dataset["fraction"].values * starts)
+        called, colours = dataset["attractor"].values, colours_of(dataset)
+        for k in np.flatnonzero(captured.any(axis=1)).tolist():
+            text = f"those that {typeset(str(called[k]))} captures"
+            alive.append((text, palette.on_white(colours[k]), total[k] - captured[k]))
+    marks: list[Mark] = []
+    for k, (text, colour, count) in enumerate(alive):
+        share = np.where(count > 0, count / starts, np.nan)
+        look: dict[str, Any] = {"name": text, "path": str(k), "colour": colour}
+        look |= {"width": 1.3 if k else 1.8, "dash": _DASHES[k % 4]}
+        marks.append(Line(periods, share, step=True, **look))
+    lowest = min(np.min(count[count > 0], initial=starts) for _, _, count in alive) / starts
+    marks += _fit(dataset, periods, alive[0][2] / starts)
+    across = Axis("periods", (periods[0], max(periods[-1], periods[0] + 1.0)))
+    up = Axis("share alive", (max(0.5 / starts, 0.5 * float(lowest)), 1.5), "log")
+    return Panel("survival", "share of starts still alive", across, up, marks)
 
 
-def _fit(dataset: xr.Dataset, whole: Curve) -> list[Mark]:
+def _fit(dataset: xr.Dataset, periods: Floats, share: Floats) -> list[Mark]:
     """Return the fitted tail; empty without transient chaos, or if the tail begins later."""
-    a = facts(dataset)
-    if not a["transient_chaos"]:
+    a, last = facts(dataset), periods[-1]
+    begin = max(float(a["from_period"]), periods[0])
+    if not a["transient_chaos"] or begin > last:
         return []
-    mean, error, begin = (
-        float(a[key]) for key in ("mean_periods", "mean_periods_stderr", "from_period")
-    )
-    last = whole.periods[-1]
-    begin = max(begin, whole.periods[0])
-    if begin > last:
-        return []
-    periods = np.linspace(begin, max(last, begin + 1), 200)
-    first = float(np.interp(begin, whole.periods, np.nan_to_num(whole.share)))
-    low, share, high = (
-        first * np.exp((periods - begin) * np.log1p(-1 / max(mean + way * SIGMAS * error, 1.01)))
+    mean, error = float(a["mean_periods"]), float(a["mean_periods_stderr"])
+    at = np.linspace(begin, max(last, begin + 1), 200)
+    low, middle, high = (
+        np.interp(begin, periods, share)
+        * np.exp((at - begin) * np.log1p(-1 / max(mean + way * SIGMAS * error, 1.01)))
         for way in (-1, 0, 1)
     )
     life = typographic(with_error(mean, error))
     text = f"tail from period {a['from_period']}: mean lifetime {life} periods"
     return [
-        Band(periods, low, high, colour=_BAND, name=text, path="band", order=1.0),
-        Line(periods, share, colour=_FIT, width=1.4, name=text, path="tail", order=5.0),
-        Level(float(periods[0]), axis="x", colour=QUIET, dash=_MARK),
+        Band(at, low, high, colour=_BAND, name=text, path="band", order=1.0),
+        Line(at, middle, colour=_FIT, width=1.4, name=text, path="tail", order=5.0),
+        Level(begin, axis="x", colour=QUIET, dash=_MARK),
     ]
-
-
-def _survival(dataset: xr.Dataset) -> Panel:
-    every = curves(dataset)
-    marks: list[Mark] = []
-    for k, one in enumerate(every):
-        text = f"those that {typeset(one.name)} captures" if one.name else "all starts"
-        look: dict[str, Any] = {"name": text, "path": str(k), "colour": one.colour}
-        look |= {"width": 1.3 if one.name else 1.8, "dash": _DASHES[k % 4]}
-        marks.append(Line(one.periods, one.share, step=True, **look))
-    marks += _fit(dataset, every[0])
-    lowest = min(np.min(one.share[one.share > 0], initial=1.0) for one in every)
-    bottom = max(0.5 / float(dataset.attrs["starts"]), 0.5 * lowest)
-    periods = every[0].periods
-    across = Axis("periods", (periods[0], max(periods[-1], periods[0] + 1.0)))
-    up = Axis("share alive", (float(bottom), 1.5), "log")
-    return Panel("survival", "share of starts still alive", across, up, marks)
 
 
 def _tail(dataset: xr.Dataset) -> Panel:

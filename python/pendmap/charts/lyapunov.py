@@ -7,23 +7,10 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
-from pendmap.analysis.orbit_table import attractors_of
-from pendmap.charts import names, palette, plane
+from pendmap.charts import names
 from pendmap.charts.chart import Axis, Chart, Panel, holding
-from pendmap.charts.legend import colours_of, typeset
-from pendmap.charts.marks import (
-    DASHED,
-    NONE,
-    QUIET,
-    ZERO,
-    Band,
-    Level,
-    Line,
-    Mark,
-    Points,
-    Span,
-    Steps,
-)
+from pendmap.charts.legend import typeset
+from pendmap.charts.marks import DASHED, QUIET, ZERO, Band, Level, Line, Span, Steps
 from pendmap.files import facts
 from pendmap.formatting import counted, typographic, with_error
 from pendmap.units import Units
@@ -31,6 +18,7 @@ from pendmap.units import Units
 if TYPE_CHECKING:
     import xarray as xr
 
+    from pendmap.charts.marks import Mark
 
 _LINE, _MEAN, _BAND, _TRANSIENT = "#1d3557", "#d55e00", "#9db4d3", "#f8edd6"
 _BINS: Final = 60  # Number of bins of the distribution
@@ -39,14 +27,11 @@ _WIDTHS: Final = {1: 6.0, 2: 8.8, 3: 12.4}  # Width of a figure by its number of
 
 
 def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> Chart:
-    """Return growth and exponent; for chaos the distribution, and in recordings the attractor."""
+    """Return the growth of deviations; for chaos also the exponent and its distribution."""
     del cells
     panels = [_growth(dataset)]
     if dataset.sizes["window"]:
         panels += [_average(dataset), _distribution(dataset)]
-    else:
-        panels.append(_sliding(dataset))
-    attractor = [_attractor(dataset)] if dataset.sizes["point"] else []
     ends = {
         "undamped": "motion without damping",
         "undecided": "undecided",
@@ -58,7 +43,6 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
         f"Largest Lyapunov exponent: {of}",
         names.with_start(facts(dataset)),
         [panels],
-        recorded=[*panels, *attractor],
         size=(_WIDTHS[len(panels)], 4.3),
     ).only(layer, (_WIDTHS[1], 4.3))
 
@@ -89,25 +73,21 @@ def _mean_look(dataset: xr.Dataset) -> dict[str, Any]:
     return {"colour": _MEAN, "width": 1.6, "dash": DASHED, "name": text}
 
 
-def _level(dataset: xr.Dataset, axis: Literal["x", "y"] = "y") -> list[Mark]:
+def _level(dataset: xr.Dataset, axis: Literal["x", "y"] = "y") -> Level:
     value = float(dataset["largest_exponent"])
-    level = Level(value, axis=axis, order=2.0, path="value", **_mean_look(dataset))
-    return [level] if math.isfinite(value) else []
+    return Level(value, axis=axis, order=2.0, path="value", **_mean_look(dataset))
 
 
 def _growth(dataset: xr.Dataset) -> Panel:
     a, periods, growth = facts(dataset), dataset["elapsed"].values, dataset["growth"].values
     marks = [*_transient(dataset), Line(periods, growth, colour=_LINE, width=1.1, path="own")]
     rate, transient = float(a["per_period"]), max(int(a["transient_periods"]), 0)
-    look = _mean_look(dataset)
     if math.isfinite(rate) and math.isfinite(a["largest_exponent_stderr"]):
         begin = min(int(np.searchsorted(periods, transient)), periods.size - 1)
         # Over many decades the constant matters little, so that the line meets the end.
         last = growth[-1] if transient else rate * periods[-1]
         line = last + rate * (periods[begin:] - periods[-1])
-        marks.append(Line(periods[begin:], line, **look))
-    elif math.isfinite(float(a["largest_exponent"])):
-        marks.append(Line(NONE, NONE, **look))
+        marks.append(Line(periods[begin:], line, **_mean_look(dataset)))
     up = Axis("ln |δx|", holding(growth, 0.0))
     title = "growth along the start's own trajectory"
     return Panel("growth", title, _clock(dataset, ""), up, marks)
@@ -129,52 +109,23 @@ def _average(dataset: xr.Dataset) -> Panel:
         text = "regular motion: deviations grow as τ"
         marks.append(Line(periods, regular, width=1.0, dash=":", name=text, order=4.0))
         shown.append(regular)
-    marks += [*_level(dataset), Line(periods, mean, colour=_LINE, path="own", order=3.0)]
+    marks += [_level(dataset), Line(periods, mean, colour=_LINE, path="own", order=3.0)]
     across = Axis("periods averaged, each", (periods[0], periods[-1]), "log")
     title = f"mean over {a['trajectories']} trajectories"
     up = Axis(_rate(dataset), holding(*shown, margin=0.08))
     return Panel("average", title, across, up, marks)
 
 
-def _sliding(dataset: xr.Dataset) -> Panel:
-    """Return exponents over ``window`` periods of the start's own trajectory."""
-    a = facts(dataset)
-    growth, elapsed = dataset["growth"].values, dataset["elapsed"].values
-    width = min(int(a["window"]), int(elapsed[-1] - elapsed[0]))
-    # In a selection only windows whose first period is selected too have an exponent.
-    begin = np.searchsorted(elapsed, elapsed - width)
-    whole = (elapsed[begin] == elapsed - width) & (width > 0)
-    gained = growth[whole] - growth[begin[whole]]
-    rates = gained / (max(width, 1) * float(a["forcing_period"]))
-    marks = [*_transient(dataset), *_level(dataset)]
-    marks.append(Line(elapsed[whole].astype(float), rates, colour=_LINE, path="own", order=3.0))
-    up = Axis(_rate(dataset), holding(rates, 0.0, float(a["largest_exponent"]), margin=0.08))
-    title = f"exponent over {a['window']} periods"
-    clock = _clock(dataset, ", last of each")
-    return Panel("average", title, clock, up, marks, root="exponent")
-
-
 def _distribution(dataset: xr.Dataset) -> Panel:
     values = dataset["finite_time_exponent"].values.ravel()
     density, edges = np.histogram(values, bins=_BINS, density=True)
-    marks: list[Mark] = [
+    marks = [
         Steps(edges, density, colour=_BAND, filled=True),
         Steps(edges, density, colour=_LINE, width=0.9, path="density"),
-        *_level(dataset, "x"),
+        _level(dataset, "x"),
+        Level(0.0, axis="x", colour=QUIET, width=0.6),
     ]
-    if edges[0] < 0 < edges[-1]:
-        marks.append(Level(0.0, axis="x", colour=QUIET, width=0.6))
     across = Axis(_rate(dataset), (float(edges[0]), float(edges[-1])))
     up = Axis("density", (0.0, 1.08 * float(density.max())))
     title = f"exponents over {dataset.attrs['window']} periods"
     return Panel("distribution", title, across, up, marks)
-
-
-def _attractor(dataset: xr.Dataset) -> Panel:
-    theta, points = plane.angles(dataset, dataset["point_theta"].values), plane.points(dataset)
-    at = plane.copies(dataset, points, *theta)
-    size = 2.0 if attractors_of(dataset)[0].chaotic else 7.0
-    colour = palette.on_white(colours_of(dataset)[0])
-    spots = Points(*at.T, colour=colour, size=size, path="points")
-    sides = names.phase_plane(theta, plane.padded(points[:, 1]), Units.of(facts(dataset)))
-    return Panel("attractor", "attractor, once a period", *sides, [spots])

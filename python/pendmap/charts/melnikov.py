@@ -34,12 +34,9 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     high = min(float(known.max()), _HIGH * float(known.min())) if known.size else 1.0
     top = max(high, 1.15 * own_p, 1e-3)
     at = {str(name): p[:, k] for k, name in enumerate(dataset["branch"].values)}
-    apart = np.abs(at["forward"] - at["backward"]) if {"forward", "backward"} <= set(at) else p[:0]
-    alike = bool(np.isfinite(apart).any()) and bool(np.nanmax(apart) < 1e-9 * top)
-    texts = {"forward": "threshold, forward", "backward": "threshold, backward"}
-    if "loop" in at:
-        texts = {name: f"heteroclinic, {name}" for name in texts}
-    elif alike:
+    kind = "heteroclinic" if "loop" in at else "threshold"
+    texts = {name: f"{kind}, {name}" for name in ("forward", "backward")}
+    if kind == "threshold" and np.allclose(at["forward"], at["backward"], 0, 1e-9, equal_nan=True):
         texts = {"forward": "threshold, both branches", "backward": ""}
     texts["loop"] = "homoclinic, loop of upright rest"
     marks: list[Mark] = []

@@ -1,15 +1,16 @@
-"""Names of axes and parameters in the units of a result, and axes shared by several panels."""
+"""Names of axes and parameters in the units of a result, axes, and charts over two parameters."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
 from pendmap.charts import plane
-from pendmap.charts.chart import Axis, holding
-from pendmap.charts.marks import DOTTED, QUIET, ZERO, Level, Mark
+from pendmap.charts.chart import Axis, Chart, Panel, holding
+from pendmap.charts.marks import DOTTED, QUIET, ZERO, Colours, Level, Mark
+from pendmap.errors import InputError
 from pendmap.formatting import typographic
 from pendmap.model import effects_of
 from pendmap.model.labels import LABELS, unit_of
@@ -17,16 +18,19 @@ from pendmap.model.quantities import COUNTERPARTS
 from pendmap.units import VELOCITY, Units
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping, Sequence
+    from collections.abc import Callable, Collection, Mapping, Sequence
 
     import numpy.typing as npt
+    import xarray as xr
 
     from pendmap.charts.marks import Ends, Floats
 
+    Layer = Callable[[str, Ends, Ends], tuple[str, list[Mark]]]
+
 ANGLE: Final = "θ (rad)"  # The angle, with its unit
 TIME: Final = "t (s)"  # Time in SI, with its unit
+_MOST_COUNT: Final = 8  # Largest count that has its own colour
 _TURN: Final = 2.0  # Range of angles above which labels are multiples of pi, rad
-_LONG: Final = 5  # Characters of a label above which an axis is in thousandths of its unit
 _MOSTLY: Final = 95
 """Percentile of absolute values that the linear part of a signed logarithmic axis contains."""
 _NEAR: Final = 12.0  # Range of an axis over its linear part up to which it is linear
@@ -108,20 +112,13 @@ def seconds(time: Floats) -> Axis:
 
 
 def angle(ends: Ends, name: str = ANGLE) -> Axis:
-    """Return the axis of an angle or a rate, with multiples of pi if long, thousandths if short."""
-    if name == ANGLE and ends[1] - ends[0] > _TURN:
-        return Axis(name, ends, "angle")
-    _, labels = plane.short_ticks(*ends, angle=False)
-    if max((len(text) for _, text in labels), default=0) > _LONG:
-        return Axis(name.replace("(rad", "(mrad"), ends, factor=1e3)
-    return Axis(name, ends)
+    """Return the axis of an angle or a rate; that of a long range of angles has multiples of pi."""
+    return Axis(name, ends, "angle" if name == ANGLE and ends[1] - ends[0] > _TURN else "plain")
 
 
 def sizes(name: str, *values: npt.ArrayLike) -> Axis:
     """Return an axis of positive values from 0, or a logarithmic one if they differ much."""
-    every = np.concatenate([np.ravel(np.asarray(one, dtype=float)) for one in values])
-    every = every[np.isfinite(every)]
-    low, high = float(every.min()), float(every.max())
+    low, high = holding(*values, margin=0.0)
     if high > _WIDE * low > 0:
         return Axis(name, (low / 1.4, 1.5 * high), "log")
     return Axis(name, (0.0, 1.15 * high))
@@ -142,3 +139,47 @@ def signed(curves: Sequence[Floats], name: str, *, least: float = 1e-12) -> tupl
     bends = [Level(end, colour=QUIET, width=0.6, dash=DOTTED, order=0.0) for end in (-inner, inner)]
     text = f"{name}\nlog beyond ±{plane.power(inner)}"
     return Axis(text, ends, "signed", straight=inner), [ZERO, *bends]
+
+
+def parameter_axis(dataset: xr.Dataset, name: str) -> Axis:
+    """Return the axis of a parameter, with its unit, as wide as the cells."""
+    text = symbol(name, str(dataset[name].attrs.get("units", "1")))
+    return Axis(text, plane.outer_edges(dataset, name))
+
+
+def over(varied: Sequence[str]) -> str:
+    """Return the symbols of the parameters that vary, for a title."""
+    return " and ".join(symbol(name) for name in varied)
+
+
+def counts(name: str, values: Floats, least: int = 0) -> Colours:
+    """Return the colour scale of whole numbers from ``least`` on."""
+    top = int(min(values.max(initial=1), _MOST_COUNT))
+    beyond: Literal["max", "neither"] = "max" if values.max(initial=0) > top else "neither"
+    ticks = [float(k) for k in range(least, top + 1)]
+    return Colours(name, "viridis", least - 0.5, top + 0.5, "counts", beyond, ticks)
+
+
+def layers(  # noqa: PLR0913, PLR0917 (parts of a chart)
+    dataset: xr.Dataset,
+    varied: tuple[str, str],
+    titles: tuple[str, str],
+    make: Layer,
+    known: Sequence[str],
+    shown: tuple[Sequence[str], Sequence[str]],
+    layer: str | None,
+) -> Chart:
+    """Return a panel of each layer over two parameters, the first one to the right.
+
+    ``make`` returns title and marks of a layer between the ends of both axes. A figure shows
+    the first of ``shown``, a recording all; or both the ``layer`` alone, one of those ``known``.
+    """
+    if layer not in {None, *known}:
+        raise InputError(f"no layer {layer!r} in this figure; it has {', '.join(known)}")
+    across, up = (plane.outer_edges(dataset, name) for name in varied)
+    sides = parameter_axis(dataset, varied[0]), parameter_axis(dataset, varied[1])
+    panels = []
+    for name in [layer] if layer else [*shown[0], *shown[1]]:
+        title, marks = make(name, across, up)
+        panels.append(Panel(name, title, *sides, marks))
+    return Chart(*titles, [panels[: len(shown[0])]], recorded=panels, ratio=0.85, tabs=True)

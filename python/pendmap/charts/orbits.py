@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pendmap.charts import names, plane
-from pendmap.charts.chart import Chart, Panel
+from pendmap.charts.chart import Chart, Panel, holding
 from pendmap.charts.legend import colours_of, typeset
 from pendmap.charts.marks import DASHED, INK, NONE, QUIET, Line, Mark, Points, together
 from pendmap.files import facts
@@ -34,7 +34,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     every = every[np.isfinite(every).all(axis=1)]
     theta = plane.angles(dataset, every[:, 0])
     box = (float(dataset.attrs["low_velocity"]), float(dataset.attrs["high_velocity"]))
-    velocity = plane.padded(every[:, 1]) if every.size else box
+    velocity = holding(every[:, 1]) if every.size else box
     marks: list[Mark] = []
     draws, over = int(dataset.attrs.get("draws", 0)), ""
     if draws:
@@ -61,7 +61,6 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
         names.parameters(facts(dataset)) + over,
         [[Panel("phase", "", *sides, marks)]],
         ratio=min(max((high - low) / (theta[1] - theta[0]), 0.6), 1.1),
-        remark="" if count else "No orbit was found.",
     ).only(layer)
 
 

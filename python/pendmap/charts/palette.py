@@ -1,19 +1,8 @@
-"""Colours and markers of attractors by their type, so that each has one in every figure.
+"""Colours and markers of attractors by their type, and of the methods of an identification.
 
 The colours start from the palette of Okabe and Ito (2008), "Color universal design", which stays
 distinguishable under the common colour deficiencies; the further ones differ in lightness as well
-as in hue. Every kind has a family, and the direction and the period n choose within it:
-
-======================  ==================================================================
-rest, inverted rest     dark grey; taupe
-rotation, forward       vermillion, then orange, rust, ... as n grows
-rotation, backward      blue, then sky blue, navy, ...
-oscillation             bluish green, then yellow, olive, ...; (+) lighter, (-) darker
-quasiperiodic rotation  forward peach, backward ice blue
-chaos                   tumbling purple; rotating wine and violet; libration pink
-no attractor            undecided light grey; failed black
-======================  ==================================================================
-
+as in hue. Every kind has a family, and the direction and the period n choose within it.
 After its last colour a family repeats, darker, then lighter, and so on (:func:`lap`). Attractors
 around another turn of the line are coloured likewise. A colour does not depend on the other
 attractors of a map, and no drawing library is imported.
@@ -22,25 +11,20 @@ attractors of a map, and no drawing library is imported.
 from __future__ import annotations
 
 import functools
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from pendmap._core import Attractor
 
-UNDECIDED = "#e4e4e4"
-"""Cells not decided within the bound (label 0)."""
-
-FAILED = "#000000"
-"""Cells whose integration failed or diverged (label -1)."""
-
-UNNAMED = "#8a8a8a"
-"""Attractors of unknown name and kind."""
-
+UNDECIDED = "#e4e4e4"  # Cells not decided within the bound (label 0)
+FAILED = "#000000"  # Cells whose integration failed or diverged (label -1)
+UNNAMED = "#8a8a8a"  # Attractors of unknown name and kind
 _LINEAR = 0.04045  # Value of sRGB up to which it is proportional to luminance
-
 CONTRAST = 2.0
 """Least contrast (WCAG 2.2) of points with a white ground; yellow has 1.3, sky blue 2.3."""
 
@@ -52,81 +36,55 @@ _SCALES = {
 }
 """Colours at equal steps of the colour maps that charts name, for recordings."""
 
-_Shade = tuple[str, str]  # the colour, and its name in words
+_FAMILIES = {
+    "rest": "474747 dark grey",
+    "inverted_rest": "c4b49f taupe",
+    "tumbling_chaos": "cc79a7 purple",
+    "libration_chaos": "ffa6d1 pink",
+    "rotating_chaos +": "8f1d4f wine",
+    "rotating_chaos -": "5b2a98 violet",
+    "quasiperiodic_rotation +": "f7c9a8 peach",
+    "quasiperiodic_rotation -": "bfe0f5 ice blue",
+    "rotation +": "d55e00 vermillion, e69f00 orange, 7a2a00 rust, f5b78a apricot, b98300 ochre",
+    "rotation -": "0072b2 blue, 56b4e9 sky blue, 123a6b navy, a9cdee pale blue, 2f8f9d teal",
+    "oscillation 0": "009e73 bluish green, f0e442 yellow, 8f9f25 olive, b5e3a1 pale green,"
+    " 00604a bottle green, c9b458 sand",
+    "oscillation 1": "7adbb8 light green, faf5a8 light yellow, c8d45f light olive, bfe88a lime,"
+    " 2f8a72 sea green, e0d08a straw",
+    "oscillation -1": "00694e dark green, 5f5a00 dark olive, 6b7a1e moss green, 7db356 leaf green,"
+    " 003a2d black green, 968436 bronze",
+}
+"""Colours of each family and their names: by direction, of oscillations by the side of a twin."""
 
-_SINGLE: dict[str, _Shade] = {
-    "rest": ("#474747", "dark grey"),
-    "inverted_rest": ("#c4b49f", "taupe"),
-    "tumbling_chaos": ("#cc79a7", "purple"),
-    "libration_chaos": ("#ffa6d1", "pink"),
+_SHADES = {
+    family: [(f"#{one[:6]}", one[7:]) for one in text.split(", ")]
+    for family, text in _FAMILIES.items()
 }
-_DIRECTED: dict[str, dict[int, tuple[_Shade, ...]]] = {
-    "rotation": {
-        +1: (
-            ("#d55e00", "vermillion"),
-            ("#e69f00", "orange"),
-            ("#7a2a00", "rust"),
-            ("#f5b78a", "apricot"),
-            ("#b98300", "ochre"),
-        ),
-        -1: (
-            ("#0072b2", "blue"),
-            ("#56b4e9", "sky blue"),
-            ("#123a6b", "navy"),
-            ("#a9cdee", "pale blue"),
-            ("#2f8f9d", "teal"),
-        ),
-    },
-    "quasiperiodic_rotation": {+1: (("#f7c9a8", "peach"),), -1: (("#bfe0f5", "ice blue"),)},
-    "rotating_chaos": {+1: (("#8f1d4f", "wine"),), -1: (("#5b2a98", "violet"),)},
+_NAMES = dict(shade for shades in _SHADES.values() for shade in shades) | {
+    UNDECIDED: "light grey",
+    FAILED: "black",
+    UNNAMED: "grey",
+    "#222222": "grey",
+    "#666666": "grey",
+    "#e6007e": "magenta",
+    "#19d3f3": "cyan",
+    "#5a1fd1": "indigo",
 }
-_OSCILLATION: dict[int, tuple[_Shade, ...]] = {
-    0: (
-        ("#009e73", "bluish green"),
-        ("#f0e442", "yellow"),
-        ("#8f9f25", "olive"),
-        ("#b5e3a1", "pale green"),
-        ("#00604a", "bottle green"),
-        ("#c9b458", "sand"),
-    ),
-    1: (
-        ("#7adbb8", "light green"),
-        ("#faf5a8", "light yellow"),
-        ("#c8d45f", "light olive"),
-        ("#bfe88a", "lime"),
-        ("#2f8a72", "sea green"),
-        ("#e0d08a", "straw"),
-    ),
-    -1: (
-        ("#00694e", "dark green"),
-        ("#5f5a00", "dark olive"),
-        ("#6b7a1e", "moss green"),
-        ("#7db356", "leaf green"),
-        ("#003a2d", "black green"),
-        ("#968436", "bronze"),
-    ),
-}
+"""Names of all colours that are not mixed."""
 
 _SHAPES = {"oscillation": "sPXph8", "inverted_rest": "D"}  # Markers by kind; others have a disc
 CURVES = ("#e6007e", "#19d3f3", "#5a1fd1")  # Colours of curves on maps, which no attractor has
 
-_LAPS = (
-    (0, 0.35, "darker"),
-    (255, 0.5, "lighter"),
-    (0, 0.6, "much darker"),
-    (255, 0.72, "much lighter"),
-    (0, 0.18, "slightly darker"),
-    (255, 0.25, "slightly lighter"),
-)
-"""Grey that a family's colours are mixed with on repetition, its share, and its name."""
+_LAPS = ((0, 0.35), (255, 0.5), (0, 0.6), (255, 0.72), (0, 0.18), (255, 0.25))
+"""Grey that a family's colours are mixed with on repetition, and its share."""
 
 _SLOWER = 5  # Factor of the period of rotations of other than one turn a period
 
 
 def colour(attractor: Attractor, further: int = 0) -> str:
     """Return the colour ``#rrggbb`` of an attractor, or the one ``further`` in its family."""
-    (code, _), round_ = _place(attractor, further)
-    return _mixed(code, round_) if round_ else code
+    code, times = _place(attractor, further)
+    return _toward(code, *_LAPS[(times - 1) % len(_LAPS)]) if times else code
 
 
 def parts(code: str) -> tuple[int, int, int]:
@@ -151,38 +109,16 @@ def on_white(code: str) -> str:
 
 def marker(attractor: Attractor) -> str:
     """Return the marker of an attractor; further ones where the colours repeat."""
-    directed = attractor.kind in _DIRECTED
-    shapes = "^>" if attractor.w > 0 else "v<" if attractor.w < 0 else ""
-    shapes = shapes if directed and shapes else _SHAPES.get(attractor.kind, "o")
+    shapes = _SHAPES.get(attractor.kind, "o")
+    if attractor.w and f"{attractor.kind} +" in _SHADES:
+        shapes = "^>" if attractor.w > 0 else "v<"
     return shapes[lap(attractor) % len(shapes)]
-
-
-@functools.cache
-def _words() -> dict[str, str]:
-    """Return every colour of this module, with its name."""
-    directed = [
-        shade for family in _DIRECTED.values() for side in family.values() for shade in side
-    ]
-    shades = [*_SINGLE.values(), *directed, *(s for some in _OSCILLATION.values() for s in some)]
-    mixed = [
-        (_mixed(code, k), f"{word} {name}")
-        for k, (_, _, word) in enumerate(_LAPS, 1)
-        for code, name in shades
-    ]
-    grey = [(UNNAMED, "grey"), ("#222222", "grey"), ("#666666", "grey")]
-    grey += [(UNDECIDED, "light grey"), (FAILED, "black")]
-    curves = zip(CURVES, ("magenta", "cyan", "indigo"), strict=True)
-    return dict(reversed([*grey, *curves, *shades, *mixed]))
 
 
 def in_words(code: str) -> str:
     """Return the name of a colour ``"#rrggbb"``, or of the nearest named one."""
-    known = _words()
-    if code in known:
-        return known[code]
-    every = list(known)
-    apart = np.array([parts(one) for one in every]) - np.array(parts(code))
-    return known[every[int(np.argmin((apart**2).sum(axis=1)))]]
+    apart = [np.subtract(parts(one), parts(code)) for one in _NAMES]
+    return [*_NAMES.values()][int(np.argmin([gap @ gap for gap in apart]))]
 
 
 def lap(attractor: Attractor) -> int:
@@ -201,29 +137,71 @@ def shades(scale: str, at: npt.ArrayLike) -> npt.NDArray[np.uint8]:
     return np.round(np.stack(mixed, axis=-1)).astype(np.uint8)
 
 
-def _mixed(code: str, round_: int) -> str:
-    """Return a colour mixed for a repetition of its family's colours."""
-    ground, part, _ = _LAPS[(round_ - 1) % len(_LAPS)]
-    return _toward(code, ground, part)
-
-
 def _toward(code: str, ground: int, part: float) -> str:
     """Return a colour mixed with a grey, 0 to 255, of this share."""
     mixed = (round((1 - part) * value + part * ground) for value in parts(code))
     return "#{:02x}{:02x}{:02x}".format(*mixed)
 
 
-def _place(attractor: Attractor, further: int = 0) -> tuple[_Shade, int]:
+def _place(attractor: Attractor, further: int = 0) -> tuple[str, int]:
     """Return the colour of an attractor in its family, and the repetitions of the family."""
     kind, n, w = attractor.kind, attractor.n or 1, attractor.w
-    family: tuple[_Shade, ...]
-    if kind in _SINGLE:
-        family, step = (_SINGLE[kind],), 0
-    elif kind in _DIRECTED:
-        family = _DIRECTED[kind][-1 if w < 0 else 1]
-        step = (n if abs(w) in (0, n) else _SLOWER * n) - 1
+    side = f"{kind} {'-' if w < 0 else '+'}"
+    if kind in _SHADES:
+        family, step = _SHADES[kind], 0
+    elif side in _SHADES:
+        family, step = _SHADES[side], (n if abs(w) in (0, n) else _SLOWER * n) - 1
     else:
-        family, step = _OSCILLATION[attractor.lean], n - 1
+        family, step = _SHADES[f"oscillation {attractor.lean}"], n - 1
     around, at = divmod(step + further, len(family))
     # Turns +1, -1, +2, ... use successive laps.
-    return family[at], around + 2 * abs(attractor.turn) - (attractor.turn > 0)
+    return family[at][0], around + 2 * abs(attractor.turn) - (attractor.turn > 0)
+
+
+# Methods of an identification.
+
+ODD, EVEN = "#d55e00", "#0072b2"
+"""Colours of half cycles that begin at a peak of odd or even number."""
+MEASURED: Final = "#222222"  # Colour of measured values
+NOISE, NOISE_SAID = "#d9d9d9", "95 % of the readings' noise"
+"""Colour and name of the band of the readings' noise."""
+
+
+class Look(NamedTuple):
+    """Name in a legend, colour ``#rrggbb`` and matplotlib dash of a method's line."""
+
+    label: str
+    colour: str
+    dash: str = "-"
+
+
+_LOOKS: Final = {
+    "trajectory": Look("trajectory", "#0072b2"),
+    "combined": Look("combined, as printed", "#d55e00"),
+    "combined_odd_ends": Look("combined, odd ends", "#7a2a00", "-."),
+    "combined_odd_triplets": Look("combined, odd triplets", "#f0a070", ":"),
+    "combined_repaired": Look("combined, repaired", "#009e73", "--"),
+    "log_decrement": Look("log decrement", "#e69f00"),
+    "de_paula": Look("de Paula", "#cc79a7"),
+    "energy_balance": Look("energy balance", "#56b4e9", "--"),
+    "model": Look("model", "#0072b2"),
+    "before": Look("before", "#d55e00"),
+    "baseline": Look("baseline", "#d55e00"),
+    "after": Look("after", "#0072b2"),
+}
+"""Colours of Okabe and Ito for methods drawn together."""
+_OTHER: Final = "#8a8a8a"
+_READINGS: Final = ("combined", "combined_odd_ends", "combined_odd_triplets")
+"""Variants of the printed method; if the first is not applicable, another is drawn instead."""
+
+
+def look(method: str) -> Look:
+    """Return the look of a method; an unknown one is grey under its own name."""
+    return _LOOKS.get(method) or Look(method.replace("_", " "), _OTHER)
+
+
+def drawn(methods: Iterable[str]) -> list[str]:
+    """Return the methods to draw: all but further variants of the printed one."""
+    there = list(methods)
+    printed = [name for name in _READINGS if name in there][:1]
+    return [name for name in there if name not in _READINGS or name in printed]

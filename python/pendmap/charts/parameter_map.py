@@ -13,7 +13,7 @@ from pendmap._core import Attractor
 from pendmap.analysis.cell_search import UNDECIDED
 from pendmap.analysis.orbit_table import attractors_of
 from pendmap.analysis.parameter_map import sets
-from pendmap.charts import names, palette, parameters, plane, tongues
+from pendmap.charts import names, palette, plane, tongues
 from pendmap.charts.legend import colours_of
 from pendmap.charts.marks import Colours, Image, Line, Mark, together
 from pendmap.files import facts
@@ -67,37 +67,32 @@ class Kind:
     @property
     def text(self) -> str:
         """Line of the legend."""
-        return f"{self.name}, {_percent(self.presence)}"
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.1f} %" if share >= 0.001 else "under 0.1 %"  # noqa: PLR2004
+        share = f"{100 * self.presence:.1f} %"
+        return f"{self.name}, {share if self.presence >= 0.001 else 'under 0.1 %'}"  # noqa: PLR2004
 
 
 def kinds(dataset: xr.Dataset) -> list[Kind]:
     """Return the kinds that a map names, in a fixed order of families."""
-    share = dataset["regime_share"].values
+    regime = dataset["regime"].values
+    share = np.bincount(regime.ravel(), minlength=dataset.sizes["set"]) / regime.size
     has = dataset["regime_has"].transpose("set", "kind").values.astype(bool)
     presence, called = share @ has, dataset["kind"].values
     looks, every = colours_of(dataset, "kind_"), attractors_of(dataset, "kind_")
     frequent = np.argsort(-presence, kind="stable")[:_MOST]
     frequent = frequent[presence[frequent] >= _LEAST]
-    ranked: list[tuple[tuple[float, ...], Kind]] = []
-    rare: dict[str, list[int]] = {}
+    groups: dict[str, list[int]] = {}
     for k in np.flatnonzero(presence).tolist():
-        family, colour = every[k].kind, looks[k]
-        if family not in _OTHERS or (k in frequent and colour != _OTHERS[family][1]):
-            one = Kind(str(called[k]), colour, (str(called[k]),), float(presence[k]))
-            ranked.append((every[k].rank, one))
-        else:
-            rare.setdefault(family, []).append(k)
-    for family, members in rare.items():
-        total = float(share[has[:, members].any(axis=1)].sum())
-        labels, first = tuple(map(str, called[members])), every[members[0]].rank
+        family = every[k].kind
+        rare = family in _OTHERS and (k not in frequent or looks[k] == _OTHERS[family][1])
+        groups.setdefault(family if rare else str(called[k]), []).append(k)
+    ranked: list[tuple[tuple[float, ...], Kind]] = []
+    for family, members in groups.items():
+        rank: tuple[float, ...] = every[members[0]].rank
+        look = str(called[members[0]]), looks[members[0]]
         if len(members) > 1:
-            ranked.append(((first[0], math.inf), Kind(*_OTHERS[family], labels, total)))
-        else:
-            ranked.append((first, Kind(labels[0], looks[members[0]], labels, total)))
+            rank, look = (rank[0], math.inf), _OTHERS[family]
+        total = float(share[has[:, members].any(axis=1)].sum())
+        ranked.append((rank, Kind(*look, tuple(map(str, called[members])), total)))
     undecided = float(share[~has.any(axis=1)].sum())
     if undecided:
         one = Kind(UNDECIDED, palette.UNDECIDED, (UNDECIDED,), undecided)
@@ -109,17 +104,14 @@ def striped(dataset: xr.Dataset, size: int, width: int) -> npt.NDArray[np.uint8]
     """Return an image of indices into :func:`kinds`, row 0 lowest, one block of pixels per cell."""
     listed = kinds(dataset)
     mine = {member: k for k, kind in enumerate(listed) for member in kind.members}
-    groups = [sorted({mine[name] for name in one}) for one in sets(dataset)]
+    groups = [sorted({mine[name] for name in one if name in mine}) for one in sets(dataset)]
     regime = plane.pixels(dataset, dataset["regime"], size)
     rows, columns = regime.shape
-    factor = [max(1, round(size / count)) for count in (rows, columns)]
-    large = np.repeat(np.repeat(regime, factor[0], axis=0), factor[1], axis=1)
-    y, x = np.indices(large.shape)
-    stripe = (x + y) // width
+    factors = [max(1, round(size / count)) for count in (rows, columns)]
+    large = np.kron(regime, np.ones(factors, dtype=regime.dtype))
+    stripe = np.add.outer(*map(np.arange, large.shape)) // width
     counts = np.array([len(group) for group in groups])
-    table = np.zeros((len(groups), max(counts)), dtype=np.uint8)
-    for k, group in enumerate(groups):
-        table[k, : len(group)] = group
+    table = np.array([np.resize(group, counts.max()) for group in groups], dtype=np.uint8)
     image: npt.NDArray[np.uint8] = table[large, stripe % counts[large]]
     return image
 
@@ -128,7 +120,6 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
     """Return the kinds of attractor, striped if several coexist, and other layers."""
     shares = [f"share {kind}" for kind in dataset["kind"].values]
     known = [one for one in LAYERS if one != "certainty" or one in dataset]
-    parameters.check_layer(layer, [*known, *shares], "this map: ")
     leading = ("kinds", "certainty" if "certainty" in dataset else "exponent")
     others = [one for one in _RECORDED if one in known and one not in leading]
     varied = str(dataset.attrs["columns"]), str(dataset.attrs["rows"])
@@ -143,9 +134,9 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
     fixed = names.parameters(facts(dataset), varied)
     rows, columns = dataset["regime"].shape
     size = f"{columns} × {rows} cells, {int(dataset.attrs['starts'])} starts each"
-    titles = f"Attractors over {parameters.over(varied)}", f"{fixed};   {size}"
-    shown = [layer] if layer else [*leading, *others]
-    return parameters.layers(dataset, varied, titles, make, shown, leading)
+    titles = f"Attractors over {names.over(varied)}", f"{fixed};   {size}"
+    every = [*known, *shares]
+    return names.layers(dataset, varied, titles, make, every, (leading, others), layer)
 
 
 def _image(dataset: xr.Dataset, name: str, across: Ends, up: Ends, cells: int) -> Image:
@@ -176,20 +167,15 @@ def _colours(dataset: xr.Dataset, name: str, values: Floats) -> Colours:
         low, high = min(low, -1e-3, -_LEAST_HALF * high), max(high, 1e-3, -_LEAST_HALF * low)
         # The halves have different scales: without ticks on both, dark blue would appear as far
         # from 0 as dark red.
-        ticks = sorted({at for side in ((low, 0.0), (0.0, high)) for at in _few(*side)})
+        halves = plane.plain_ticks(low, 0.0)[::-2], plane.plain_ticks(0.0, high)[::2]
+        ticks = sorted({at for half in halves for at, _ in half})
         text = f"{text} ({unit}{none})"
         return Colours(text, "RdBu_r", low, high, "centred", "both", ticks)
     if name == "period":
-        return parameters.counts(f"{text} (drive's; grey: none)", values, 1)
+        return names.counts(f"{text} (drive's; grey: none)", values, 1)
     if name in ("attractors", "winding"):
-        return parameters.counts(text, values)
+        return names.counts(text, values)
     return Colours(text, "cividis", 0.0, 1.0)
-
-
-def _few(low: float, high: float) -> list[float]:
-    """Return at most four round ticks in a half of a colour bar."""
-    ticks = [at for at, _ in plane.plain_ticks(low, high)]
-    return ticks[::2] if low == 0.0 or len(ticks) % 2 else ticks[1::2]
 
 
 def _curves(dataset: xr.Dataset) -> list[Mark]:
@@ -197,13 +183,16 @@ def _curves(dataset: xr.Dataset) -> list[Mark]:
     if "curve_p" not in dataset:
         return []
     omega = dataset["curve_omega"].values
-    rows = tongues.by_frequency(dataset, "curve_", omega.size)
-    turned = str(dataset.attrs["rows"]).lower() == "omega"
+    at, p, multiplier = (dataset[f"curve_{one}"].values for one in ("index", "p", "multiplier"))
+    plus, minus = (
+        tongues.joined(omega, omega[at[multiplier == m]], p[multiplier == m]) for m in (1, -1)
+    )
     sought = dataset["curve_fold_sought"].values > 0
     fold = np.stack([omega, dataset["curve_fold"].values], axis=1)[sought]
+    turned = str(dataset.attrs["rows"]).lower() == "omega"
     curves = (
-        ("rest: multiplier +1", "-", tongues.joined(omega, rows, 1)),
-        (typographic("rest: multiplier -1"), "--", tongues.joined(omega, rows, -1)),
+        ("rest: multiplier +1", "-", plus),
+        (typographic("rest: multiplier -1"), "--", minus),
         ("fold of the oscillation born there", ":", [fold]),
     )
     marks: list[Mark] = []

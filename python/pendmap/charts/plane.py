@@ -9,27 +9,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from pendmap.charts.chart import holding
 from pendmap.formatting import typographic
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from pendmap.charts.chart import Axis
     from pendmap.charts.marks import Floats
 
 Ticks = list[tuple[float, str]]
 TWO_PI = 2.0 * math.pi
-
 FEWEST, MOST = 2.0, 6.5  # Least and greatest number of tick steps of a range of angles
-
 FURTHEST = 1000  # Multiple of pi beyond which angles have plain numbers as labels
-
 NARROW = 1e-4
 """Width of a window, relative to its distance from 0, below which its ticks have an offset."""
-
+CLOSEST = 0.8  # Least distance of ticks of a logarithmic axis, over that of as many as have room
 _FINE = 8  # Pixels of the narrowest cell if cells differ in width
-
-LOG_TICKS = 4  # Least number of ticks of a logarithmic colour bar, if its range allows
-
 MOST_COPIES = 100  # Greatest number of copies of a point, at distances of 2 pi, in a window
 
 
@@ -90,7 +86,7 @@ def on_line(dataset: xr.Dataset) -> bool:
 
 def angles(dataset: xr.Dataset, theta: Floats) -> tuple[float, float]:
     """Return the limits of an axis of angles: one turn, or all angles if they are not wrapped."""
-    return padded(theta) if on_line(dataset) and theta.size else (-math.pi, math.pi)
+    return holding(theta) if on_line(dataset) and theta.size else (-math.pi, math.pi)
 
 
 def points(dataset: xr.Dataset) -> Floats:
@@ -110,6 +106,25 @@ def copies(dataset: xr.Dataset, points: Floats, low: float, high: float) -> Floa
     every = np.concatenate([points + np.array([k * TWO_PI, 0.0]) for k in range(first, last + 1)])
     inside: Floats = every[(every[:, 0] >= low - slack) & (every[:, 0] <= high + slack)]
     return inside
+
+
+def ticks(axis: Axis, low: float, high: float, most: int = 8) -> tuple[str, Ticks]:
+    """Return the name of an axis and its ticks with labels between two ends, about ``most``."""
+    name, listed = axis.name, list(axis.ticks or ())
+    if axis.ticks is None and axis.scale == "log":
+        listed = [(at, power(at)) for at in log_ticks(low, high, most)]
+    elif axis.ticks is None and axis.scale == "signed":
+        last = max(0, math.floor(math.log10(max(-low, high) / axis.straight)))
+        sizes = [axis.straight * 10.0**k for k in range(last, -1, -(2 * last + 3) // most)]
+        listed = [(at, power(at)) for size in sizes for at in (-size, size)] + [(0.0, "0")]
+    elif axis.ticks is None:
+        shift, short = short_ticks(low, high, angle=axis.scale == "angle")
+        zero = next((k for k, tick in enumerate(short) if tick[1] == "0"), 0)
+        every = -(-len(short) // most)
+        listed = [(shift + at, text) for at, text in short[zero % every :: every]]
+        name = shifted(name, shift)
+    slack = 1e-9 * (high - low)
+    return name, [one for one in listed if low - slack <= one[0] <= high + slack]
 
 
 def angle_ticks(low: float, high: float) -> Ticks:
@@ -135,15 +150,19 @@ def plain_ticks(low: float, high: float) -> Ticks:
     return [(k * step, _written(k * step, digits)) for k in _between(low, high, step)]
 
 
-def log_ticks(low: float, high: float) -> list[float]:
-    """Return ticks 1, 2, 5, 10, ... between the ends, more if these are close."""
-    for steps in ((1,), (1, 3), (1, 2, 5), tuple(range(1, 10))):
-        powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
-        ticks = [m * 10.0**k for k in powers for m in steps]
-        inside = [t for t in ticks if low * 0.999 <= t <= high * 1.001]
-        if len(inside) >= LOG_TICKS:
-            return inside
-    return sorted({float(round(x)) for x in np.linspace(low, high, 5)})
+def log_ticks(low: float, high: float, most: int = 8) -> list[float]:
+    """Return ticks at powers of ten, and round numbers between them if they are not too many."""
+    powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    listed: list[float] = []
+    for steps in (range(1, 10), (1, 2, 5), (1, 3), (1,)):
+        every = (m * 10.0**k for k in powers for m in steps)
+        listed = [at for at in every if low * 0.999 <= at <= high * 1.001]
+        gap = np.min(np.diff(np.log10(listed)), initial=math.inf)
+        if most * gap >= CLOSEST * math.log10(high / low):
+            break
+    if len(listed) < 2:  # noqa: PLR2004 (a scale)
+        return sorted({float(round(x)) for x in np.linspace(low, high, 5)})
+    return listed[:: -(-len(listed) // most)]
 
 
 def short_ticks(low: float, high: float, *, angle: bool) -> tuple[float, Ticks]:
@@ -206,13 +225,6 @@ def wrapped(theta: Floats) -> Floats:
     """Return angles wrapped to (-pi, pi], for angles of any size."""
     within: Floats = math.pi - np.remainder(math.pi - theta, TWO_PI)
     return within
-
-
-def padded(values: Floats) -> tuple[float, float]:
-    """Return the limits of an axis that contains the values, with a margin, never empty."""
-    low, high = float(np.min(values)), float(np.max(values))
-    pad = max(0.06 * (high - low), 0.05, 1e-6 * max(abs(low), abs(high)))
-    return low - pad, high + pad
 
 
 def _offset(low: float, high: float) -> float:

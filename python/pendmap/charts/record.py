@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 import textwrap
 from typing import TYPE_CHECKING, Any, Final
 
@@ -30,40 +31,40 @@ MOST_POINTS: Final = 20_000  # Greatest number of residuals drawn; more only mak
 MOST_LINES: Final = 14  # Greatest number of lines of findings below the panels
 MOST_RUNS: Final = 12  # Greatest number of strips of a figure; the text of ``look`` lists every run
 FEW: Final = 400  # Number of samples below which each is drawn as a dot
-APART: Final = 0.22  # Least distance between numbers in a row, inches
+LETTERS: Final = 104  # Letters per line below the panels
+APART: Final = 0.03  # Least distance between numbers in a row, over the width of the record
 SHORT: Final = 2e-3  # Duration of a finding, over the record's, below which it is drawn as a point
 WIDTH: Final = 8.6  # Width of a figure, inches
 
 
-def sheet(records: Experiment | Run, *, width: float = WIDTH) -> Chart:
+def sheet(records: Experiment | Run) -> Chart:
     """Return one record in detail, or a strip of each run."""
     if isinstance(records, Run):
-        return _one(records, width)
-    return _one(records.runs[0], width) if len(records.runs) == 1 else _many(records, width)
+        return _one(records)
+    return _one(records.runs[0]) if len(records.runs) == 1 else _many(records)
 
 
-def _one(run: Run, width: float) -> Chart:
-    letters = max(int((width - 1.0) / 0.073), 20)
+def _one(run: Run) -> Chart:
     lines: list[str] = []
     for number, finding in enumerate(run.findings, 1):
         text = f"{number}  {'mended: ' if finding.mended else ''}{finding.text}"
-        lines += textwrap.wrap(text, letters, subsequent_indent="    ", max_lines=2)
+        lines += textwrap.wrap(text, LETTERS, subsequent_indent="    ", max_lines=2)
     if len(lines) > MOST_LINES:
         lines = [*lines[: MOST_LINES - 1], "...  pendmap look has the rest"]
     if run.peaks_only:
         ends = f"{moment(run.time[0])} to {moment(run.time[-1])} s"
-        subtitle, last = f"{run.time.size} turning points, {ends}", _decay(run)
+        subtitle, below = f"{run.time.size} turning points, {ends}", [_intervals(run)]
     else:
         noise = noise_said(noise_floor(run), noise_unit(run)).split(",", maxsplit=1)[0]
         used = f"{run.trusted.sum()} of {run.time.size} samples for fitting"
         subtitle = f"{run.kind}, {run.rate_hz:.5g} Hz, {used};   noise {typographic(noise)}"
-        last = _residuals(run)
+        below = [_intervals(run), _residuals(run)]
     return Chart(
         f"Record {run.name}",
         subtitle,
-        [[_flags(run, width)], [_history(run)], [_intervals(run), last]],
+        [[_flags(run)], [_history(run)], below],
         heights=(0.15, 1.25, 1.0),
-        size=(width, 6.3 + 0.19 * len(lines)),
+        size=(WIDTH, 6.3 + 0.19 * len(lines)),
         notes=lines,
     )
 
@@ -103,24 +104,23 @@ def _history(run: Run) -> Panel:
     return Panel("history", "", clock, names.angle(holding(run.theta)), marks)
 
 
-def _flags(run: Run, width: float) -> Panel:
+def _flags(run: Run) -> Panel:
     """Return the numbers of findings at their times, in two rows without overlap."""
     low, high = float(run.time[0]), float(run.time[-1])
     begin, end = holding(run.time, margin=0.01)
-    inches = (width - 1.0) / (end - begin)
-    taken: list[list[float]] = [[], []]
+    least = APART * (end - begin)
+    last = [begin - least, begin - least]
     marks: list[Mark] = []
-    for number, finding in enumerate(run.findings, 1):
-        if finding.from_s is None or finding.to_s is None:
+    placed = [
+        (max(one.from_s, low), min(one.to_s, high), number, one)
+        for number, one in enumerate(run.findings, 1)
+        if one.from_s is not None and one.to_s is not None
+    ]
+    for left, right, number, finding in sorted(placed, key=operator.itemgetter(0)):
+        row = int(np.argmin(last))
+        if right < left or left - last[row] < least:
             continue
-        left, right = max(finding.from_s, low), min(finding.to_s, high)
-        if right < low or left > high:
-            continue
-        at = (left - begin) * inches
-        row = next((r for r in (0, 1) if all(abs(at - x) > APART for x in taken[r])), None)
-        if row is None:
-            continue
-        taken[row].append(at)
+        last[row] = left
         colour = QUIET if finding.mended else ALARM
         ends, height = np.array([left, right]), np.full(2, row + 0.12)
         if right - left > SHORT * (high - low) and not finding.where.startswith("row"):
@@ -137,26 +137,16 @@ def _intervals(run: Run) -> Panel:
     steps = 1e3 * np.diff(run.time)
     usual = float(np.median(steps))
     low, high = float(steps.min()), float(steps.max())
-    wide = high > 20 * max(low, 1e-9 * usual)
-    if wide:
+    pad = max(0.05 * (high - low), 0.02 * usual)
+    edges = np.linspace(low - pad, high + pad, 61)
+    if wide := high > 20 * max(low, 1e-9 * usual):
         edges = np.geomspace(max(low, 1e-6 * usual) / 1.1, high * 1.1, 61)
-    else:
-        pad = max(0.05 * (high - low), 0.02 * usual)
-        edges = np.linspace(low - pad, high + pad, 61)
     counts = np.maximum(np.histogram(steps, edges)[0], 1e-3)
     ends = float(edges[0]), float(edges[-1])
     across = Axis("interval (ms)", ends, "log" if wide else "plain")
     up = Axis("samples", (0.7, 1.5 * steps.size), "log")
     title = "between turning points" if run.peaks_only else "the clock"
     return Panel("clock", title, across, up, [Steps(edges, counts, colour=USED, filled=True)])
-
-
-def _decay(run: Run) -> Panel:
-    size = np.maximum(np.abs(run.theta), 1e-9)
-    clock = Axis("t (s)", (float(run.time[0]), float(run.time[-1])))
-    ends = (float(size.min()) / 1.5, float(size.max()) * 1.5)
-    up = Axis("|θ| (rad)", ends, "log")
-    return Panel("last", "the decay", clock, up, [Points(run.time, size, colour=USED, size=2.5)])
 
 
 def _residuals(run: Run) -> Panel:
@@ -172,22 +162,19 @@ def _residuals(run: Run) -> Panel:
         return Panel("last", title, none, none, [Text(0.5, 0.5, "too few samples")])
     some = slice(None, None, max(speed.size // MOST_POINTS, 1))
     marks: list[Mark] = [Points(speed[some], residual[some], colour="#a9b8cc", size=0.8)]
-    for part in noise.by_speed:
-        ends = np.array([part.speed_from, min(part.speed_to, float(speed.max()))])
-        level = np.full(2, 1e3 * part.sigma)
-        marks.append(Line(ends, level, colour=FALSE, width=1.8, name="standard deviation"))
-    top = max(4.5e3 * noise.sigma, 1e3 * max((p.sigma for p in noise.by_speed), default=0.0) * 1.5)
+    reach = np.linspace(0.0, float(speed.max()), 50)
+    law = noise.law
+    sigma = np.full(50, noise.sigma) if law is None else np.hypot(law.still, law.tau * reach)
+    marks.append(Line(reach, 1e3 * sigma, colour=FALSE, width=1.8, name="standard deviation"))
+    top = 1e3 * max(4.5 * noise.sigma, 1.5 * float(sigma.max()))
     # An angle changes with the velocity, a rate with the acceleration.
-    speeds = "|dθ/dt| (rad/s)"
-    if run.gyroscope is not None:
-        speeds = "|d²θ/dt²| (rad/s²)"
-    fastest = max((part.speed_to for part in noise.by_speed), default=float(speed.max()))
-    across = Axis(speeds, (0.0, max(fastest * 1.03, 1e-9)))
+    speeds = "|dθ/dt| (rad/s)" if run.gyroscope is None else "|d²θ/dt²| (rad/s²)"
+    across = Axis(speeds, (0.0, max(float(reach[-1]) * 1.03, 1e-9)))
     up = Axis(f"residual (m{noise_unit(run)})", (0.0, max(top, 1e-9)))
     return Panel("last", title, across, up, marks)
 
 
-def _many(experiment: Experiment, width: float) -> Chart:
+def _many(experiment: Experiment) -> Chart:
     """Return a strip for each run, from its own start, with a common time scale."""
     runs = experiment.runs[:MOST_RUNS]
     longest = max(float(run.time[-1] - run.time[0]) for run in runs)
@@ -195,14 +182,14 @@ def _many(experiment: Experiment, width: float) -> Chart:
     known = ", ".join(f"{name} = {value:g}" for name, value in experiment.known.items())
     panels = []
     for k, run in enumerate(runs):
-        words = (
-            [run.kind]
-            if run.drive is None
-            else [run.kind, f"p = {run.drive['p']:g}, Ω = {run.drive['Omega']:g} rad/s"]
-        )
-        words += ["held out"] if run.hold_out else []
-        findings = listed([finding.what for finding in run.findings], 3)
-        title = f"{run.name}: " + ", ".join([*words, findings] if findings else words)
+        drive = run.drive
+        words = [
+            run.kind,
+            f"p = {drive['p']:g}, Ω = {drive['Omega']:g} rad/s" if drive else "",
+            "held out" if run.hold_out else "",
+            listed([finding.what for finding in run.findings], 3),
+        ]
+        title = f"{run.name}: " + ", ".join(filter(None, words))
         name = "t from the start (s)" if k + 1 == len(runs) else ""
         clock = Axis(name, (-0.01 * longest, 1.01 * longest))
         marks = _samples(run, run.time - run.time[0], 0.7)
@@ -212,6 +199,6 @@ def _many(experiment: Experiment, width: float) -> Chart:
         f"Experiment {experiment.path.resolve().name}",
         f"{len(experiment.runs)} runs{shown};   {known}".rstrip("; "),
         [[panel] for panel in panels],
-        size=(width, 1.4 + 1.25 * len(runs)),
+        size=(WIDTH, 1.4 + 1.25 * len(runs)),
         letters=False,
     )

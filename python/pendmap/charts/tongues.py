@@ -6,14 +6,13 @@ import itertools
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-import numpy.typing as npt
+from scipy.optimize import linear_sum_assignment
 
-from pendmap.analysis.critical_curves import PLANES, in_plane, window
+from pendmap.analysis.critical_curves import in_plane, window
 from pendmap.analysis.tongues import NEAR
 from pendmap.charts import names
 from pendmap.charts.chart import Axis, Chart, Panel
 from pendmap.charts.marks import QUIET, Areas, Line, Mark, Points, Text, this_pendulum, together
-from pendmap.errors import InputError
 from pendmap.files import facts
 from pendmap.formatting import typographic
 
@@ -40,12 +39,9 @@ _PLANES: Final = {
     "e-alpha2": ("paper", "α² = 1/ω²", "e = p/ω² = Y/l"),
 }
 """Path in a recording, and names of the axes, of each plane."""
-
 _PARTED = 0.3  # Error above which an asymptotic curve is not drawn
-
-_TIP = 0.6  # Amplitude below which an undamped tongue is extended to its tip
-
 _JUMP = 0.6  # Largest change of p along a line from point to point, over the mean p plus 0.3
+_FAR: Final = 1e6  # Cost of joining points that lie on different curves
 
 
 def chart(
@@ -58,9 +54,7 @@ def chart(
 ) -> Chart:
     """Return the critical curves in both planes; a figure shows one of them."""
     del cells
-    first = layer or str(dataset.attrs.get("plane", PLANES[0]))
-    if first not in PLANES:
-        raise InputError(f"layer must be one of {', '.join(PLANES)}, got {first!r}")
+    first = str(dataset.attrs.get("plane"))
     order = sorted(_PLANES, key=lambda plane: plane != first)
     panels = [_panel(dataset, plane, marks) for plane in order]
     return Chart(
@@ -70,7 +64,7 @@ def chart(
         recorded=panels,
         ratio=0.72,
         tabs=True,
-    )
+    ).only(layer)
 
 
 def _panel(dataset: xr.Dataset, plane: str, marks: Sequence[tuple[float, float, str]]) -> Panel:
@@ -85,27 +79,23 @@ def _panel(dataset: xr.Dataset, plane: str, marks: Sequence[tuple[float, float, 
     def curve(lines: Iterable[Floats], **look: Any) -> Line:  # noqa: ANN401 (fields of a line)
         return Line(*together(map(to, lines)), **look)
 
+    def critical(prefix: str, which: int) -> list[Floats]:
+        return joined(omega, *_points(dataset, prefix, which))
+
     rest = "rest: its orbit is stable" if attrs["moved"] else "rest is stable"
-    first = dataset["stable_at_first"].values
-    hanging = [to(area) for area in _stable(omega, dataset, "", first, p_max)]
+    hanging, inverted = ([to(area) for area in _stable(dataset, one)] for one in ("", "inverted_"))
     drawn: list[Mark] = [Areas(hanging, colour=_STABLE, name=f"hanging {rest}")]
-    none = np.zeros_like(first)
-    inverted = [to(area) for area in _stable(omega, dataset, "inverted_", none, p_max)]
     if inverted:
         # A hatch leaves the area below it visible, and has no seams.
         name = f"inverted {rest}"
         drawn.append(Areas(inverted, colour=_INVERTED, hatch="////", name=name))
-    result, above, undamped = (
-        by_frequency(dataset, prefix, omega.size) for prefix in ("", "inverted_", "undamped_")
-    )
     for m, (name, text, colour, pale) in _CURVES.items():
         look: dict[str, Any] = {"width": 1.5 if m < 0 else 1.1, "order": 2.2}
-        lines = joined(omega, result, m)
-        drawn.append(curve(lines, colour=colour, name=text, path=name, **look))
-        lines = joined(omega, above, m)
+        drawn.append(curve(critical("", m), colour=colour, name=text, path=name, **look))
+        lines = critical("inverted_", m)
         look["name"] = f"inverted rest: {text.partition(' (')[0]}" if lines else ""
         drawn.append(curve(lines, colour=pale, path=f"inverted_{name}", **look))
-    lines = [_tipped(line, m, omega) for m in _CURVES for line in joined(omega, undamped, m)]
+    lines = [line for m in _CURVES for line in critical("undamped_", m)]
     text = "exact, without damping" if float(attrs["gamma"]) > 0 and lines else ""
     drawn.append(curve(lines, colour=QUIET, width=0.6, name=text, path="undamped"))
     fold = np.stack([omega, dataset["fold"].values], axis=-1)[dataset["fold_sought"].values > 0]
@@ -121,16 +111,15 @@ def _panel(dataset: xr.Dataset, plane: str, marks: Sequence[tuple[float, float, 
     if (edge[:, 1] < 0.995 * top).any():
         drawn.append(Line(*edge.T, colour="#c8c8c8", width=3.0, name="largest p computed", order=1))
     if not marks:
-        mine = to(np.array([[float(attrs["own_omega"]), float(attrs["own_p"])]]))
-        inside = x[0] <= mine[0, 0] <= x[1] and 0 <= mine[0, 1] <= top
-        drawn.append(this_pendulum(*map(float, mine[0]), named=bool(inside)))
+        at, up = map(float, to(np.array([float(attrs["own_omega"]), float(attrs["own_p"])])))
+        drawn.append(this_pendulum(at, up, named=x[0] <= at <= x[1] and 0 <= up <= top))
     for p, at, name in marks:
-        spot = to(np.array([[at, p]]))
-        drawn.append(Points(*spot.T, size=5.0))
-        across, up = spot[0] + (0.015 * (x[1] - x[0]), 0.012 * top)
-        drawn.append(Text(across, up, name, align=("left", "bottom")))
-    root, across, up = _PLANES[plane]
-    return Panel(plane, "", Axis(across, x), Axis(up, (0.0, top)), drawn, root=root)
+        spot = to(np.array([at, p]))
+        drawn.append(Points(*spot[:, None], size=5.0))
+        aside, up = spot[0] + 0.015 * (x[1] - x[0]), spot[1] + 0.012 * top
+        drawn.append(Text(aside, up, name, align=("left", "bottom")))
+    root, across, along = _PLANES[plane]
+    return Panel(plane, "", Axis(across, x), Axis(along, (0.0, top)), drawn, root=root)
 
 
 def _asymptotic(dataset: xr.Dataset, to: Callable[[Floats], Floats]) -> list[Mark]:
@@ -155,102 +144,65 @@ def _bands(dataset: xr.Dataset, prefix: str) -> list[Floats]:
     if f"{prefix}p_low" not in dataset:
         return []
     low, high = (dataset[f"{prefix}p_{end}"].values for end in ("low", "high"))
-    omega = dataset["omega"].values[dataset[f"{prefix}index"].values]
+    omega, _ = _points(dataset, prefix)
     ends = np.stack([np.stack([omega, low], axis=1), np.stack([omega, high], axis=1)], axis=1)
     return [*ends[np.isfinite(low)]]
 
 
-def by_frequency(dataset: xr.Dataset, prefix: str, count: int) -> list[list[tuple[float, int]]]:
-    """Return amplitude and multiplier of the critical points of each frequency."""
-    result: list[list[tuple[float, int]]] = [[] for _ in range(count)]
-    columns = (dataset[f"{prefix}{name}"].values for name in ("index", "p", "multiplier"))
-    for index, p, multiplier in zip(*columns, strict=True):
-        result[int(index)].append((float(p), int(multiplier)))
-    return result
+def joined(omega: Floats, at: Floats, p: Floats) -> list[Floats]:
+    """Return lines, each (n, 2), through critical amplitudes ``p`` at frequencies ``at``.
 
-
-def joined(omega: Floats, result: list[list[tuple[float, int]]], multiplier: int) -> list[Floats]:
-    """Return the lines through the points with this multiplier."""
-    open_: list[list[Point]] = []
+    Points at successive frequencies are joined where they continue lines best. Where a curve turns
+    back between two frequencies, its neighbouring ends are joined.
+    """
     done: list[list[Point]] = []
-    for w, row in zip(omega, result, strict=True):
-        values = [p for p, m in row if m == multiplier]
-        pairs = sorted(
-            (abs(_ahead(line, w) - p), i, j)
-            for i, line in enumerate(open_)
-            for j, p in enumerate(values)
-            if _close(line[-1], (w, p))
-        )
-        taken: dict[int, int] = {}
-        for _, i, j in pairs:
-            if i not in taken and j not in taken.values():
-                taken[i] = j
-        for i, j in taken.items():
-            open_[i].append((w, values[j]))
-        done += _paired([line for i, line in enumerate(open_) if i not in taken])
-        begun = [[(w, p)] for j, p in enumerate(values) if j not in taken.values()]
-        # Two neighbouring lines that begin here are one curve that turns back between frequencies.
-        for lower, upper in itertools.pairwise(begun if w > omega[0] else []):
-            if _close(lower[0], upper[0]) and len(lower) == 1:
-                upper.insert(0, lower[0])
-        open_ = [*(open_[i] for i in sorted(taken)), *begun]
-    return [np.array(line) for line in [*done, *open_] if len(line) > 1]
+    lines: list[list[Point]] = []
+    for w in omega:
+        values = np.sort(p[at == w])
+        ends = np.array([line[-1][1] for line in lines])
+        away = np.abs(np.array([_ahead(line, w) for line in lines])[:, None] - values)
+        far = np.abs(ends[:, None] - values) >= _reach(ends[:, None], values)
+        pairs = linear_sum_assignment(np.where(far, _FAR, away))
+        following = {int(i): int(j) for i, j in zip(*pairs, strict=True) if not far[i, j]}
+        for i, j in following.items():
+            lines[i].append((w, values[j]))
+        new = [[(w, v)] for j, v in enumerate(values) if j not in following.values()]
+        ended = [line for i, line in enumerate(lines) if i not in following]
+        done += ended + _turns(sorted(line[-1] for line in ended))
+        done += _turns([line[0] for line in new]) if w > omega[0] else []
+        lines = [*(lines[i] for i in sorted(following)), *new]
+    return [np.array(line) for line in [*done, *lines] if len(line) > 1]
 
 
-def _close(a: Point, b: Point) -> bool:
-    """Return whether points at one frequency or neighbouring ones lie on one curve."""
-    return abs(a[1] - b[1]) < _JUMP * (0.3 + (a[1] + b[1]) / 2)
+def _reach(one: Any, other: Any) -> Any:  # noqa: ANN401 (numbers or arrays)
+    """Return the distance below which points at neighbouring frequencies lie on one curve."""
+    return _JUMP * (0.3 + (one + other) / 2)
 
 
-def _paired(ended: list[list[Point]]) -> list[list[Point]]:
-    """Join neighbouring lines that end at one frequency, at which a curve turns back."""
-    done: list[list[Point]] = []
-    for line in sorted(ended, key=lambda one: one[-1][1]):
-        if done and done[-1][-1][0] == line[-1][0] and _close(done[-1][-1], line[-1]):
-            done[-1] = [*done[-1], *reversed(line)]
-        else:
-            done.append(line)
-    return done
-
-
-def _tipped(line: Floats, multiplier: int, omega: Floats) -> Floats:
-    """Add the tip of an undamped tongue, ``p = 0`` at ``omega = 2/k``, to a line around it."""
-    spacing = float(np.diff(omega).max())
-    for k in range(1 if multiplier < 0 else 2, 9, 2):
-        tip = 2 / k
-        for i, ((w0, p0), (w1, p1)) in enumerate(itertools.pairwise(line)):
-            around = min(w0, w1) - spacing < tip < max(w0, w1) + spacing
-            passed = w0 == w1 or (w0 - tip) * (w1 - tip) < 0
-            if around and passed and 0 < max(p0, p1) < _TIP:
-                line = np.insert(line, i + 1, (tip, 0.0), axis=0)
-                break
-    return line
+def _turns(ends: Sequence[Point]) -> list[list[Point]]:
+    """Return joints between neighbouring ends at one frequency, at which a curve turns back."""
+    pairs = list(itertools.pairwise(ends))
+    return [[a, b] for a, b in pairs if abs(a[1] - b[1]) < _reach(a[1], b[1])]
 
 
 def _ahead(line: list[Point], w: float) -> float:
     """Return the extrapolation of a line to the next frequency."""
-    if len(line) == 1:
-        return line[-1][1]
-    (w0, p0), (w1, p1) = line[-2:]
-    if w0 == w1:  # it begins at a turning point of a curve
-        return p1
-    return p1 + (p1 - p0) * (w - w1) / (w1 - w0)
+    (w0, p0), (w1, p1) = line[-2:] if len(line) > 1 else (line[0], line[0])
+    return p1 + (p1 - p0) * (w - w1) / (w1 - w0) if w1 > w0 else p1
 
 
-def _stable(
-    omega: Floats, dataset: xr.Dataset, prefix: str, first: npt.NDArray[np.int8], p_max: float
-) -> list[Floats]:
+def _stable(dataset: xr.Dataset, prefix: str) -> list[Floats]:
     """Return quadrangles between neighbouring frequencies in which rest is stable."""
-    keys = ("index", "p", "multiplier", "stable_above")
-    index, p, multiplier, above = (dataset[f"{prefix}{key}"].values for key in keys)
-    intervals: list[list[tuple[float, float]]] = []
-    curves: list[tuple[int, ...]] = []
-    for k in range(omega.size):
-        mine = index == k
-        curves.append(tuple(multiplier[mine]))
+    omega, p_max = dataset["omega"].values, float(dataset.attrs["p_max"])
+    at, p = _points(dataset, prefix)
+    above = dataset[f"{prefix}stable_above"].values
+    first = np.zeros(omega.size) if prefix else dataset["stable_at_first"].values
+    intervals: list[list[Point]] = []
+    for w, stable in zip(omega, first, strict=True):
+        mine = at == w
         edges = itertools.pairwise([0.0, *p[mine], p_max])
-        merged: list[tuple[float, float]] = []
-        for (low, high), yes in zip(edges, [int(first[k]), *above[mine]], strict=True):
+        merged: list[Point] = []
+        for (low, high), yes in zip(edges, [stable, *above[mine]], strict=True):
             if yes and merged and merged[-1][1] == low:
                 merged[-1] = (merged[-1][0], high)
             elif yes and high > low:
@@ -259,10 +211,16 @@ def _stable(
     areas = []
     for k, (here, there) in enumerate(itertools.pairwise(omega)):
         before, after = intervals[k], intervals[k + 1]
-        # Curves that exceed p_max at one of the frequencies come last.
-        alike = all(one == other for one, other in zip(curves[k], curves[k + 1], strict=False))
-        same = alike and len(before) == len(after)
+        same = len(before) == len(after)
         for a, b in zip(before, after, strict=True) if same else itertools.product(before, after):
             if same or min(a[1], b[1]) > max(a[0], b[0]):
                 areas.append(np.array([(here, a[0]), (here, a[1]), (there, b[1]), (there, b[0])]))
     return areas
+
+
+def _points(dataset: xr.Dataset, prefix: str, which: int = 0) -> tuple[Floats, Floats]:
+    """Return the critical points of a multiplier, or all: frequencies and amplitudes."""
+    multiplier = dataset[f"{prefix}multiplier"].values
+    at, p = dataset[f"{prefix or 'critical_'}omega"].values, dataset[f"{prefix}p"].values
+    mine = (multiplier == which) | (which == 0)
+    return at[mine], p[mine]

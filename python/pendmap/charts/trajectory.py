@@ -39,7 +39,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     units, time = Units.of(facts(dataset)), dataset["time"].values
     ends = (float(time[0]), float(time[-1])) if time[-1] > time[0] else None
     below = Axis(names.clock(units), ends)
-    sides = names.phase_plane((-math.pi, math.pi), plane.padded(dataset["velocity"].values), units)
+    sides = names.phase_plane((-math.pi, math.pi), holding(dataset["velocity"].values), units)
     rows = [
         [_history(dataset, below if layer else Axis("", ends))],
         [_energy(dataset, below)],

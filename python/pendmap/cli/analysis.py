@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import importlib
 import inspect
@@ -11,14 +10,13 @@ from typing import TYPE_CHECKING, Any
 from pendmap import ANALYSES
 from pendmap.cli.parse.groups import group, new_command
 from pendmap.cli.parse.model_options import model_options
-from pendmap.cli.parse.options import added, output_options, simd_option, store_options
+from pendmap.cli.parse.options import added, output_options, resume_option, simd_option
 from pendmap.cli.parse.signature import options_of, parameters
 from pendmap.cli.parse.types import Address
 from pendmap.cli.show import begin, made_here, show
-from pendmap.cli.text import say
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Sequence
 
     import click
 
@@ -43,8 +41,7 @@ def analysis_command(
     ``options`` are options, and names of parameters of the analysis (:func:`options_of`), which
     ``example`` shows. The decorated function takes model, outputs and their values, and returns the
     keyword arguments of the analysis; its docstring is the help, which ``examples`` end. What is
-    ``stored`` is computed in tiles, by workers if they are given, and kept in a store if ``--out``
-    names one.
+    ``stored`` is computed in tiles, and kept in a store if ``--out`` names one.
     """
     kind, function = next(
         (k, functions[0]) for k, (which, functions, _) in ANALYSES.items() if which == name
@@ -54,24 +51,22 @@ def analysis_command(
 
     def make(prepare: Callable[..., dict[str, Any]]) -> click.Command:
         def run(**given: Any) -> None:  # noqa: ANN401 (the options)
-            resume, *workers = (given.pop(key, None) for key in ("resume", "workers", "scheduler"))
-            chosen = {key: given.pop(key) for key in ("threads", "seed") if key in given}
-            pendulum, outputs = begin(given, name, going_on=bool(resume))
+            resume = given.pop("resume", False)
+            chosen: dict[str, Any] = {
+                key: given.pop(key) for key in ("threads", "seed") if key in given
+            }
+            pendulum, outputs = begin(given, name, going_on=resume)
             arguments = prepare(pendulum, outputs, **given)
             module = importlib.import_module(f"pendmap.analysis.{kind}")
             store = outputs.store if stored else None
             if arguments.get("draws") and not isinstance(store, Address):
                 store = None  # draws are written when all are computed
-            with (
-                _workers(*workers, quiet=outputs.quiet) as executor,
-                made_here(),
-                outputs.progress(name) as progress,
-            ):
+            with made_here(), outputs.progress(name) as progress:
                 if runs:
                     from pendmap.analysis.run import RunOptions
 
-                    run_options = {"store": store, "resume": bool(resume), "executor": executor}
-                    arguments["run"] = RunOptions(progress=progress, **run_options, **chosen)
+                    chosen |= {"progress": progress, "store": store, "resume": resume}
+                    arguments["run"] = RunOptions(**chosen)
                 dataset = getattr(module, function)(pendulum, **arguments)
             if store is None:
                 show(dataset, outputs, module.SCHEMA)
@@ -82,23 +77,9 @@ def analysis_command(
         shown = [options_of(path, o, own_group) if isinstance(o, str) else o for o in options]
         runs = "run" in parameters(path)
         chosen = [options_of("analysis.run.RunOptions", "threads seed")] if runs else []
-        tiles = [store_options] if stored else []
+        tiles = [resume_option] if stored else []
         files = output_options(stored=stored)
         decorate = added(model, *shown, *tiles, *chosen, simd_option, files)
         return new_command(name, *examples, text=text)(decorate(run))
 
     return make
-
-
-@contextlib.contextmanager
-def _workers(count: int | None, scheduler: str | None, *, quiet: bool) -> Iterator[Any]:
-    """Yield the executor of --workers or --scheduler, or None; say if there are no workers."""
-    if scheduler is None and count is None:
-        yield None
-        return
-    from pendmap.engine import executor_of
-
-    with executor_of(scheduler, count) as executor:
-        if not quiet and not executor.nthreads():
-            say(f"{scheduler} has no workers yet: waiting for them.", err=True)
-        yield executor

@@ -267,9 +267,10 @@ def keep_files(options: Mapping[Path | Address, str]) -> None:
     """Refuse files and stores that exist, named by their option."""
     for path, option in options.items():
         if isinstance(path, Address):
-            from pendmap.engine import ZarrStore
+            from pendmap.files.dataset import reached, sealed
 
-            there = [str(path)] if ZarrStore(path).finished() else []
+            with reached(path):
+                there = [str(path)] if sealed(path) else []
         else:
             files = _report_files(path) if option == "--report" else [path]
             there = [str(file) for file in files if file.exists()]

@@ -9,7 +9,7 @@ from pendmap.formatting import Estimate
 from pendmap.identification import results
 from pendmap.identification.fit import fit_runs
 from pendmap.identification.methods.base import Identification
-from pendmap.identification.methods.trajectory import OFFSET
+from pendmap.identification.parameters import OFFSET
 from pendmap.identification.peaks import find_peaks
 from pendmap.identification.readings import as_fit_run, reading_of_run
 from pendmap.identification.runs import rig_of

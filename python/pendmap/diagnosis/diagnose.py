@@ -146,7 +146,7 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
             reasons,
             "where",
             lambda: residual_torque(fitted, begin.fitted.fit, begin.fitted.noise),
-            Torque.unknown(begin.fitted.noise),
+            Torque(begin.fitted.noise),
         )
     scores = state.scores(begin.fitted)
     if progress is not None:

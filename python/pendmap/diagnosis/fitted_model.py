@@ -12,7 +12,7 @@ import numpy as np
 from pendmap.diagnosis.candidates import add_candidates
 from pendmap.errors import FitDiverged
 from pendmap.identification.fit import TrajectoryFit, fit_runs
-from pendmap.identification.valley import refine_exponent
+from pendmap.identification.sensitivity import refine_exponent
 from pendmap.residuals.noise import ResidualNoise, estimate_noise
 
 if TYPE_CHECKING:

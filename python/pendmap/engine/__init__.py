@@ -1,22 +1,5 @@
-"""Computations in tiles: where their results are kept, and who computes them."""
+"""Computations in tiles: their steps, who computes them, where their records are kept."""
 
-from pendmap.engine.executors import executor_of
-from pendmap.engine.lock import held
-from pendmap.engine.store import Layout, MemoryStore, Store, pack, unpack
-from pendmap.engine.work import Job, Tile, Work, rounding
-from pendmap.engine.zarr_store import ZarrStore
+from pendmap.engine.work import FileStore, Store, Work, pack, rounding, unpack
 
-__all__ = [
-    "Job",
-    "Layout",
-    "MemoryStore",
-    "Store",
-    "Tile",
-    "Work",
-    "ZarrStore",
-    "executor_of",
-    "held",
-    "pack",
-    "rounding",
-    "unpack",
-]
+__all__ = ["FileStore", "Store", "Work", "pack", "rounding", "unpack"]

@@ -1,33 +1,41 @@
-"""A computation in tiles: its steps, and the loop that does them.
+"""A computation in tiles: its steps, who computes them, where their records are kept.
 
-A job is a function of its request. It proceeds in steps; a step computes tiles, each from the
-step's state and from what earlier steps have stored, never from other tiles of the step. So neither
-the number of workers, nor their order, nor an interruption changes a bit of the result.
+It proceeds in steps; a step computes tiles, each from the step's state and from what earlier steps
+have stored, never from other tiles of the step. So neither the number of workers, nor their order,
+nor an interruption changes a bit of the result. A record is arrays or bytes under a name; that of a
+tile is ``STEP/TILE``. Only the process that drives a run reads and writes records.
 """
 
 from __future__ import annotations
 
+import concurrent.futures
 import contextlib
 import dataclasses
-import functools
 import hashlib
+import io
+import json
+import os
 import threading
-from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
 
-from pendmap.engine.executors import WorkersGoneError, results
-from pendmap.engine.store import MemoryStore
-from pendmap.errors import InputError, NotWrittenError, instruction_set
-from pendmap.files import COMPLETE
+import numpy as np
+
+from pendmap.errors import InputError, NotWrittenError, instruction_set, one_line, short_repr
+from pendmap.files import COMPLETE, dataset
+from pendmap.files.atomic import lock
 from pendmap.formatting import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator, MutableMapping
 
-    from pendmap.engine.store import Cells, Store
+    import xarray as xr
+    from numpy.typing import NDArray
 
     Progress = Callable[[int, int], object]
 
+_REQUEST: Final = "request"  # The first record
+_CHECK: Final = 32  # Bytes of a SHA-256, at the beginning of a record in a file
 _PARTS: Final = 1000  # Units of progress of a tile
 _ROUNDING: Final = {"avx512": "fused", "avx2": "fused"}
 """How instruction sets multiply and add: with one rounding, or with two."""
@@ -39,41 +47,150 @@ def rounding() -> str:
     return _ROUNDING.get(name, name)
 
 
-@dataclasses.dataclass(frozen=True)
-class Tile:
-    """The result of a tile."""
-
-    record: bytes
-    cells: Cells = dataclasses.field(default_factory=dict)
+def pack(**arrays: Any) -> dict[str, NDArray[Any]]:
+    """Return arrays as a record."""
+    return {name: np.asarray(values) for name, values in arrays.items()}
 
 
-class Job(Protocol):
-    """What the tiles of a computation are; it is sent to workers."""
+def unpack(record: Any) -> dict[str, NDArray[Any]]:
+    """Return the arrays of a record; one that is read from a file is an ``.npz``."""
+    if not isinstance(record, bytes):
+        return dict(record)
+    with np.load(io.BytesIO(record), allow_pickle=False) as archive:
+        return {name: archive[name] for name in archive.files}
 
-    @property
-    def at_once(self) -> int:
-        """Number of tiles that this process computes at once without an executor."""
 
-    def inputs(self, store: Store, step: str, tile: int) -> Any:  # noqa: ANN401 (the job's own)
-        """Return what a tile needs of earlier steps."""
+class Store:
+    """Records in the memory of this process."""
 
-    def tile(self, step: str, state: bytes, tile: int, inputs: Any, progress: Any = None) -> Tile:  # noqa: ANN401
-        """Compute a tile."""
+    def __init__(self) -> None:
+        self.records: MutableMapping[str, Any] = {}
+
+    def get(self, name: str) -> Any:
+        """Return a record, or None if there is none."""
+        return self.records.get(name)
+
+    def put(self, name: str, record: Any) -> None:
+        """Write a record."""
+        self.records[name] = record
+
+    def done(self, step: str) -> set[int]:
+        """Return the tiles of a step whose record is there."""
+        names = (name.rpartition("/") for name in self.records)
+        return {int(tile) for folder, _, tile in names if folder == step}
+
+
+class FileStore(Store):
+    """A run at a path or an address: its records are in ``map.zarr.part`` until it is complete."""
+
+    def __init__(self, address: str) -> None:
+        super().__init__()
+        self.address = address.rstrip("/")
+        self.unfinished = f"{self.address}.part"
+        self._system, self._path = dataset.place(self.address)
+        self.records = self._system.get_mapper(f"{self._path}.part/records")
+        self._request: dict[str, Any] = {}
+        self._begun = True
+
+    @contextlib.contextmanager
+    def held(self) -> Iterator[None]:
+        """Hold a store at a path while a run writes it; InputError if another run does."""
+        if not dataset.is_local(self.address):
+            yield
+            return
+        path = Path(f"{self._path}.lock")
+        if not path.parent.is_dir():
+            raise FileNotFoundError(2, "the folder does not exist", str(path.parent))
+        with path.open("wb") as file:
+            if hasattr(os, "register_at_fork"):  # a child may outlive the run
+                os.register_at_fork(after_in_child=file.close)
+            try:
+                lock(file)
+                alone = os.path.samestat(os.fstat(file.fileno()), path.stat())
+            except OSError as error:  # without locks nothing keeps two runs apart
+                alone = not isinstance(error, BlockingIOError | FileNotFoundError)
+            if not alone:
+                text = "is held by another run: a store has one run at a time"
+                raise InputError(f"{self.address}: {text}")
+            try:
+                yield
+            finally:
+                path.unlink(missing_ok=True)
+
+    def begin(self, request: dict[str, Any], *, resume: bool) -> xr.Dataset | None:
+        """Begin a run or go on with one; return its result if it is complete."""
+        self._request = request
+        seal = dataset.sealed(self.address) if resume else None
+        stored = self.get(_REQUEST)
+        if seal is not None and (stored is None or seal[_REQUEST] == request):
+            self._check(seal[_REQUEST] or {})
+            result: xr.Dataset = dataset.load(self.address)
+            self._clear()
+            return result
+        if stored is not None and not resume:
+            goes_on = "is an unfinished run: --resume (resume=True) goes on with it"
+            raise InputError(f"{self.unfinished}: {goes_on}; a new run must have another name")
+        if stored is not None:
+            self._check(json.loads(stored))
+        elif {*self.records} - {_REQUEST}:
+            raise InputError(f"{self.unfinished}: is no run, or is damaged: it must be removed")
+        else:
+            dataset.check_replaceable(self.address)
+            self._begun = False
+        return None
+
+    def _check(self, stored: dict[str, Any]) -> None:
+        """Raise InputError if the request is another than the stored one."""
+        for key in {**self._request, **stored}:
+            before, now = stored.get(key), self._request.get(key)
+            if before != now:
+                words = f"{key} = {short_repr(before)}, not {short_repr(now)}"
+                raise InputError(f"{self.address}: was begun with {words}")
+
+    def get(self, name: str) -> Any:
+        """Return the bytes of a record; None if there is none, or a kill or damage has cut it."""
+        data = self.records.get(name, b"")
+        content = data[_CHECK:]
+        return content if hashlib.sha256(content).digest() == data[:_CHECK] else None
+
+    def put(self, name: str, record: Any) -> None:
+        """Write a record; the first one after the request."""
+        if not self._begun:
+            self._begun = True
+            self.put(_REQUEST, json.dumps(self._request).encode())
+        if not isinstance(record, bytes):
+            stream = io.BytesIO()
+            np.savez(stream, **record)
+            record = stream.getvalue()
+        self.records[name] = hashlib.sha256(record).digest() + record
+
+    def complete(self, result: xr.Dataset) -> None:
+        """Write the result, and remove the records."""
+        if dataset.is_local(self.address):
+            dataset.check_replaceable(self.address)
+        dataset.write_store(result, self.address, self._request)
+        self._clear()
+
+    def _clear(self) -> None:
+        """Remove the records; other files are left alone."""
+        if self._system.exists(f"{self._path}.part/records"):
+            self._system.rm(f"{self._path}.part/records", recursive=True)
+        with contextlib.suppress(OSError):
+            self._system.rmdir(f"{self._path}.part")
 
 
 @dataclasses.dataclass
 class Work:
     """A job in progress."""
 
-    job: Job
-    store: Store = dataclasses.field(default_factory=MemoryStore)
+    job: Any
+    """What is sent to workers: ``inputs(store, step, tile)``, what a tile needs of earlier steps;
+    ``tile(step, state, tile, inputs, progress)``, its record; ``at_once``, tiles at once here."""
+    store: Store = dataclasses.field(default_factory=Store)
     executor: Any = None
     progress: Progress | None = None
     tiles_done: int = 0
-    """Tiles that are in the store."""
     tiles: int = 0
-    step: str = ""
-    """Step that is computed."""
 
     @contextlib.contextmanager
     def named(self, address: str) -> Iterator[None]:
@@ -81,147 +198,102 @@ class Work:
         try:
             yield
         except KeyboardInterrupt:
-            COMPLETE.append(f"{address} ({self._kept})")
+            COMPLETE.append(f"{address} ({self._stored})")
             raise
         except OSError as error:
             if error.errno is None:
-                raise NotWrittenError(f"{error}; {self._kept}") from error
-            raise OSError(error.errno, f"{error.strerror}; {self._kept}", address) from error
+                raise NotWrittenError(f"{error}; {self._stored}") from error
+            raise OSError(error.errno, f"{error.strerror}; {self._stored}", address) from error
 
     @property
-    def _kept(self) -> str:
-        with contextlib.suppress(Exception):  # workers may have stored more than they have told
-            self.tiles_done = max(self.tiles_done, len(self.store.done(self.step)))
+    def _stored(self) -> str:
         return f"{self.tiles_done} of {counted(self.tiles, 'tile')} are kept, --resume goes on"
 
-    def once(self, name: str, make: Callable[[], bytes]) -> bytes:
+    def once(self, name: str, make: Callable[[], Any]) -> Any:
         """Return a record; make and store it if it is not there."""
-        data = self.store.get(name)
-        if data is None:
-            data = make()
-            self.store.put(name, data)
-        return data
+        record = self.store.get(name)
+        if record is None:
+            record = make()
+            self.store.put(name, record)
+        return record
 
-    def each(self, step: str, state: str, tiles: Iterable[int]) -> Iterator[tuple[int, bytes]]:
-        """Yield tiles of a step with their records, computing those that are not there.
-
-        ``state`` names the record that all tiles of the step need.
-        """
-        done = self.store.done(step)
-        wanted, missing = list(tiles), []
-        self.tiles, self.tiles_done, self.step = len(wanted), 0, step
+    def each(self, step: str, state: str, tiles: Iterable[int]) -> Iterator[tuple[int, Any]]:
+        """Yield tiles with their records, computed from the record ``state`` if not there yet."""
+        done, wanted = self.store.done(step), list(tiles)
+        missing = []
+        self.tiles, self.tiles_done = len(wanted), 0
         for tile in wanted:
             record = self.store.get(f"{step}/{tile}") if tile in done else None
-            if record is None or not self.store.holds(step, tile):
+            if record is None:
                 missing.append(tile)
                 continue
             self.tiles_done += 1
             yield tile, record
         self._report(0)
-        for tile, record in self._computed(step, state, missing):
+        for tile, record in self._computed(step, self.store.get(state), missing):
+            if isinstance(record, Exception):
+                raise record
+            self.store.put(f"{step}/{tile}", record)
             self.tiles_done += 1
             self._report(0)
             yield tile, record
 
-    def _computed(self, step: str, state: str, tiles: list[int]) -> Iterator[tuple[int, bytes]]:
-        if self.executor is None:
-            yield from self._here(step, state, tiles)
-            return
-        answers = results(self.executor, self._call(step, state), tiles)
-        try:
-            for tile, answer in answers:
-                if isinstance(answer, Exception):
-                    raise answer
-                if answer.cells:  # the worker cannot open the store
-                    self.store.write(tile, answer.cells)
-                if not self.store.shared:
-                    self.store.put(f"{step}/{tile}", answer.record)
-                yield tile, answer.record
-        except WorkersGoneError as error:
-            raise NotWrittenError(f"the workers are gone ({error})") from error
-        finally:
-            answers.close()
-
-    def _here(self, step: str, state: str, tiles: list[int]) -> Iterator[tuple[int, bytes]]:
-        """Compute tiles in this process, several at once on threads if the job has one for each."""
-        data = self.store.get(state) or b""
+    def _computed(self, step: str, state: Any, tiles: list[int]) -> Iterator[tuple[int, Any]]:
+        """Yield tiles as they are done: one by one, on threads, or by the executor."""
         stop = threading.Event()
 
-        def compute(tile: int, _: int = 0) -> Tile:
-            def report(done: int, total: int) -> None:
-                if stop.is_set():
-                    raise KeyboardInterrupt
-                if self.job.at_once == 1:
-                    self._report(_PARTS * done // max(total, 1))
+        def check(_done: int, _total: int) -> None:
+            if stop.is_set():
+                raise KeyboardInterrupt
 
-            inputs = self.job.inputs(self.store, step, tile)
-            return self.job.tile(step, data, tile, inputs, report)
+        def call(tile: int) -> tuple[Any, ...]:
+            return self.job, rounding(), step, state, tile, self.job.inputs(self.store, step, tile)
 
-        with contextlib.ExitStack() as stack:
-            outcomes: Iterable[tuple[int, Tile]] = ((tile, compute(tile)) for tile in tiles)
-            if self.job.at_once > 1:
-                pool = stack.enter_context(ThreadPoolExecutor(self.job.at_once))
-                stack.callback(stop.set)  # before the pool waits for its threads
-                outcomes = results(pool, lambda tile: (compute, tile), tiles)
-            for tile, one in outcomes:
-                if one.cells:
-                    self.store.write(tile, one.cells)
-                self.store.put(f"{step}/{tile}", one.record)
-                yield tile, one.record
+        if self.executor is not None:
+            yield from _results(self.executor, tiles, call)
+        elif self.job.at_once == 1:
+            for tile in tiles:
+                yield tile, _tile(*call(tile), self._report)
+        else:
+            with concurrent.futures.ThreadPoolExecutor(self.job.at_once) as pool:
+                try:
+                    yield from _results(pool, tiles, lambda tile: (*call(tile), check))
+                finally:
+                    stop.set()  # before the pool waits for its threads
 
-    def _call(self, step: str, state: str) -> Callable[[int], tuple[Any, ...]]:
-        """Return the function that returns what an executor gets for a tile."""
-        job, store, bits = self.job, self.store, rounding()
-        data = store.get(state) or b""
-        if store.shared:
-            known = (state, hashlib.sha256(data).hexdigest())
-            return lambda tile: (_in_store, job, store, step, known, bits, tile)
-        return lambda tile: (_alone, job, step, data, bits, tile, job.inputs(store, step, tile))
-
-    def _report(self, part: int) -> None:
+    def _report(self, done: int, total: int = 1) -> None:
+        """Report the tiles that are done, and the part done of the one in work."""
         if self.progress is not None:
-            self.progress(_PARTS * self.tiles_done + min(part, _PARTS), _PARTS * max(self.tiles, 1))
+            part = min(_PARTS * done // max(total, 1), _PARTS)
+            self.progress(_PARTS * self.tiles_done + part, _PARTS * max(self.tiles, 1))
 
 
-def _alone(  # noqa: PLR0913, PLR0917 (what a worker needs)
-    job: Job,
-    step: str,
-    state: bytes,
-    bits: str,
-    tile: int,
-    inputs: Any,  # noqa: ANN401 (the job's own)
-    _: int,
-) -> Tile | Exception:
+def _results(
+    executor: Any, tiles: list[int], call: Callable[[int], tuple[Any, ...]]
+) -> Iterator[tuple[int, Any]]:
+    """Yield tiles with their records as they are done; cancel what is in flight when closed."""
+    futures: dict[concurrent.futures.Future[Any], int] = {}
+    try:
+        if hasattr(executor, "get_executor"):  # Dask takes equal calls for one, unless told
+            executor = executor.get_executor(pure=False)
+        for tile in tiles:
+            futures[executor.submit(_tile, *call(tile))] = tile
+        for future in concurrent.futures.as_completed(futures):
+            yield futures.pop(future), future.result()
+    except Exception as error:  # of many kinds; those of tiles are results
+        reason = one_line(str(error)) or type(error).__name__
+        raise NotWrittenError(f"the workers are gone ({reason})") from error
+    finally:
+        for future in futures:
+            future.cancel()
+
+
+def _tile(job: Any, bits: str, *words: Any) -> Any:
     """Compute a tile; an error is a result, so that every executor treats it alike."""
     if rounding() != bits:
         message = "instruction set of a worker must round like that of the run"
         return InputError(f"{message} ({bits}), got {rounding()}")
     try:
-        return job.tile(step, state, tile, inputs)
+        return job.tile(*words)
     except Exception as error:  # noqa: BLE001 (raised in the process that drives)
         return error
-
-
-def _in_store(  # noqa: PLR0913, PLR0917 (what a worker needs)
-    job: Job, store: Store, step: str, state: tuple[str, str], bits: str, tile: int, attempt: int
-) -> Tile | Exception:
-    """Compute a tile and store it; return its record."""
-    try:
-        inputs = job.inputs(store, step, tile)
-        outcome = _alone(job, step, _state(store, *state), bits, tile, inputs, attempt)
-        if isinstance(outcome, Exception):
-            return outcome
-        store.write(tile, outcome.cells)
-        store.put(f"{step}/{tile}", outcome.record)
-    except Exception as error:  # noqa: BLE001 (as above)
-        return error
-    return Tile(outcome.record)
-
-
-@functools.lru_cache(maxsize=4)
-def _state(store: Store, name: str, digest: str) -> bytes:
-    """Return the state of a step, read once by each worker."""
-    data = store.get(name) or b""
-    if hashlib.sha256(data).hexdigest() != digest:
-        raise InputError(f"{name} of the store must be that of the run, a worker has got another")
-    return data

@@ -1,31 +1,30 @@
-"""File access: atomic writing, TOML, and results as NetCDF or Zarr (``files.dataset``)."""
+"""Files: written whole or not at all; TOML; results as NetCDF or Zarr (``files.dataset``)."""
 
-from pendmap.files.atomic import (
-    COMPLETE,
-    STOPS,
-    check_regular,
-    check_room,
-    held_interrupts,
-    move_folder,
-    read_whole,
-    whole_file,
-    whole_folder,
-)
-from pendmap.files.scalars import facts, with_facts
-from pendmap.files.toml import read_toml, toml_text
+from __future__ import annotations
 
-__all__ = [
-    "COMPLETE",
-    "STOPS",
-    "check_regular",
-    "check_room",
-    "facts",
-    "held_interrupts",
-    "move_folder",
-    "read_toml",
-    "read_whole",
-    "toml_text",
-    "whole_file",
-    "whole_folder",
-    "with_facts",
-]
+from typing import Any
+
+from pendmap.files.atomic import COMPLETE as COMPLETE
+from pendmap.files.atomic import STOPS as STOPS
+from pendmap.files.atomic import check_regular as check_regular
+from pendmap.files.atomic import check_room as check_room
+from pendmap.files.atomic import held_interrupts as held_interrupts
+from pendmap.files.atomic import read_whole as read_whole
+from pendmap.files.atomic import whole_file as whole_file
+from pendmap.files.atomic import whole_folder as whole_folder
+from pendmap.files.toml import read_toml as read_toml
+from pendmap.files.toml import toml_text as toml_text
+
+
+def facts(dataset: Any) -> dict[str, Any]:
+    """Return the attributes of a result and its variables without dimensions, as plain values."""
+    scalars = {name: one.values.item() for name, one in dataset.variables.items() if not one.dims}
+    return {str(name): value for name, value in {**dataset.attrs, **scalars}.items()}
+
+
+def with_facts(dataset: Any, **values: Any) -> Any:
+    """Return a result with these values in the place of its attributes and scalar variables."""
+    scalars = {name: value for name, value in values.items() if name in dataset.variables}
+    rest = {name: value for name, value in values.items() if name not in scalars}
+    scalars = {name: ((), value, dataset[name].attrs) for name, value in scalars.items()}
+    return dataset.assign(scalars).assign_attrs(rest)

@@ -1,4 +1,4 @@
-"""Atomic writing of files and folders: each is complete or absent."""
+"""Whole files and folders: each is complete or absent; and checks of a path before it is used."""
 
 from __future__ import annotations
 
@@ -9,21 +9,20 @@ import re
 import shutil
 import signal
 import stat
+import tempfile
 import threading
-import uuid
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import IO, TYPE_CHECKING, Final
 
 from pendmap.errors import InputError
 
 try:
     import fcntl
-except ImportError:  # without file locks, stages of killed processes cannot be recognised
+except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
-    from typing import IO
 
 COMPLETE: Final[list[str]] = []  # Files written so far; the message of an interrupt names them
 # Signals that ask the program to stop: Ctrl-C, kill and timeout, a terminal that was closed
@@ -31,7 +30,7 @@ STOPS: Final = tuple(
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
 )
 # Name of a stage, the temporary folder in which files are written before they are moved
-_STAGE: Final = re.compile(r"\.pendmap-[0-9a-f]{32}\.part")
+_STAGE: Final = re.compile(r"\.pendmap-\w{8}\.part")
 _OWNER: Final = "owner"  # File in a stage that its process keeps locked
 _PROBE: Final = 2**20  # Bytes of a trial write, which fails on a full disk, and of one read
 _LEAST: Final = 4096  # Bytes of the trial write before a computation: one block of most disks
@@ -39,12 +38,8 @@ _LEAST: Final = 4096  # Bytes of the trial write before a computation: one block
 
 @contextlib.contextmanager
 def held_interrupts() -> Iterator[None]:
-    """Delay SIGINT, SIGTERM and SIGHUP until the end of the block, then raise the first one.
-
-    An interrupted library may keep its locks and deadlock (NetCDF's does). Outside the main
-    thread, which receives no signals, nothing is done.
-    """
-    if threading.current_thread() is not threading.main_thread():
+    """Delay the signals that stop until the end of the block: a library may deadlock on them."""
+    if threading.current_thread() is not threading.main_thread():  # it receives no signals
         yield
         return
     held: list[int] = []
@@ -63,12 +58,7 @@ def held_interrupts() -> Iterator[None]:
 
 @contextlib.contextmanager
 def whole_file(path: str | os.PathLike[str], suffixes: Sequence[str]) -> Iterator[Path]:
-    """Yield a temporary path with the same file name; move its file to ``path`` at the end.
-
-    ``path`` always holds either the complete new file or its previous content. Raises InputError
-    for suffixes other than ``suffixes`` (lower case), OSError if nothing can be written, also if a
-    library raises another error for it. An interrupt is delayed until the file is in place.
-    """
+    """Yield a temporary path with the same name and a known suffix; move its file to ``path``."""
     target = Path(path)
     suffix = target.suffix.lower()
     if suffix not in suffixes:
@@ -76,64 +66,38 @@ def whole_file(path: str | os.PathLike[str], suffixes: Sequence[str]) -> Iterato
         raise InputError(f"cannot write {str(target)!r}: suffix must be {known}, got {suffix!r}")
     if target.is_dir():
         raise IsADirectoryError(errno.EISDIR, "is a folder", str(target))
-    with _named(target), _stage(target.parent) as stage:
+    with _stage(target) as stage:
         part = stage / target.name
         part.touch()
-        with _disk_faults(part):
-            yield part
-        synced(part)
+        yield part
+        _sync(part)
         part.replace(target)
 
 
 @contextlib.contextmanager
 def whole_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Yield a temporary path for a new folder; move the folder to ``path`` at the end.
-
-    A folder at ``path`` is kept until the new one is complete, and then removed; the caller checks
-    that it may be. Symbolic links are followed. Raises OSError if nothing can be written. An
-    interrupt is delayed until the folder is in place.
-    """
+    """Yield a temporary path for a new folder; move it to ``path``, in the place of one there."""
     target = Path(path).resolve()
-    with _named(Path(path)), _stage(target.parent) as stage:
-        new = stage / "new" / target.name
+    with _stage(Path(path), target.parent) as stage:
+        new, old = (stage / kind / target.name for kind in ("new", "old"))
         new.parent.mkdir()
-        with _disk_faults(stage / "probe"):
-            yield new
-        synced(new)
-        _replace(target, new, stage)
-
-
-def move_folder(new: Path, target: Path) -> None:
-    """Move a folder to ``target``, on the same disk; a folder there is removed after that."""
-    synced(new)
-    with _named(target), _stage(target.parent) as stage:
-        _replace(target, new, stage)
-
-
-def _replace(target: Path, new: Path, stage: Path) -> None:
-    old = stage / "old" / target.name
-    old.parent.mkdir()
-    if target.exists():
-        target.rename(old)
-    try:
-        new.rename(target)
-    except OSError:
-        _put_back(stage)
-        raise
-    _sync(target.parent)
-
-
-def synced(path: Path) -> None:
-    """Write a file, or a folder with all that is in it, from the memory of the system to disk."""
-    for folder, _, names in os.walk(path) if path.is_dir() else ():
-        for name in names:
-            _sync(Path(folder, name))
-        _sync(Path(folder))
-    if not path.is_dir():
-        _sync(path)
+        old.parent.mkdir()
+        yield new
+        for folder, _, names in os.walk(new):
+            for name in (*names, "."):
+                _sync(Path(folder, name))
+        if target.exists():
+            target.rename(old)
+        try:
+            new.rename(target)
+        except OSError:
+            _put_back(stage)
+            raise
+        _sync(target.parent)
 
 
 def _sync(path: Path) -> None:
+    """Write a file or the entries of a folder from the memory of the system to disk."""
     with contextlib.suppress(PermissionError):  # Windows opens no folder
         descriptor = os.open(path, os.O_RDWR if os.name == "nt" else os.O_RDONLY)
         try:
@@ -168,22 +132,14 @@ def check_regular(path: str | os.PathLike[str], descriptor: int | None = None) -
 
 
 def check_room(path: str | os.PathLike[str], size: int = 0) -> None:
-    """Raise OSError if a file or folder of ``size`` bytes cannot be written.
-
-    Checks the parent folder, the permission and the free space before anything is computed.
-    """
+    """Raise OSError if a file or folder of ``size`` bytes cannot be written there."""
     target = Path(path)
-    with _named(target), _stage(target.parent) as stage:
-        probe = stage / "probe" / target.name
-        probe.parent.mkdir()
-        probe.write_bytes(bytes(_LEAST))
+    with _stage(target) as stage:
+        (stage / target.name).write_bytes(bytes(_LEAST))
         free = shutil.disk_usage(stage).free
     if free < size:
-        raise OSError(
-            errno.ENOSPC,
-            f"the disk has {free / 1e6:.0f} MB free, {size / 1e6:.0f} MB are needed",
-            str(target),
-        )
+        needed = f"the disk has {free / 1e6:.0f} MB free, {size / 1e6:.0f} MB are needed"
+        raise OSError(errno.ENOSPC, needed, str(target))
 
 
 @contextlib.contextmanager
@@ -200,83 +156,41 @@ def _named(target: Path) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _disk_faults(part: Path) -> Iterator[None]:
-    """Raise the disk's own error in place of an unspecific one of a library."""
-    try:
-        yield
-    except (InputError, MemoryError, OSError):
-        raise
-    except Exception:
-        with part.open("ab") as stream:
-            stream.write(bytes(_PROBE))
-        raise
-
-
-@contextlib.contextmanager
-def _stage(folder: Path) -> Iterator[Path]:
-    """Remove stages of killed processes; yield a new stage, which is removed at the end."""
-    with held_interrupts():
-        _sweep(folder)
-        while True:
-            stage = folder / f".pendmap-{uuid.uuid4().hex}.part"
-            stage.mkdir()
-            # A process that sweeps at the same moment may remove the new stage.
-            with contextlib.suppress(FileNotFoundError):
-                owner = (stage / _OWNER).open("xb")
-                if _locked(owner) and (stage / _OWNER).exists():
-                    break
-                owner.close()
-        with owner:
+def _stage(target: Path, folder: Path | None = None) -> Iterator[Path]:
+    """Yield a new folder beside a path, removed at the end; interrupts wait until then."""
+    folder = folder or target.parent
+    with held_interrupts(), _named(target):
+        for other in folder.glob(".pendmap-*.part"):
+            if _STAGE.fullmatch(other.name) and not other.is_symlink():
+                with contextlib.suppress(OSError), (other / _OWNER).open("rb+") as owner:
+                    lock(owner)  # its process was killed
+                    _put_back(other)
+                    shutil.rmtree(other)
+        new = Path(tempfile.mkdtemp(".part", ".pendmap_", folder))
+        with (new / _OWNER).open("wb") as owner:
+            with contextlib.suppress(OSError):
+                lock(owner)
+            stage = new.rename(folder / f".pendmap-{new.name.removeprefix('.pendmap_')}")
             try:
                 yield stage
+            except (InputError, MemoryError, OSError):
+                raise
+            except Exception:  # the disk's own error is raised in place of an unspecific one
+                (stage / "probe").write_bytes(bytes(_PROBE))
+                raise
             finally:
-                _remove(stage)
+                shutil.rmtree(stage, ignore_errors=True)
 
 
-def _locked(owner: IO[bytes]) -> bool:
-    """Lock the owner file of a stage; return False if another process holds the lock."""
+def lock(file: IO[bytes]) -> None:
+    """Lock a file until it is closed; BlockingIOError if another has it, OSError without locks."""
     if fcntl is None:
-        return True
-    try:
-        fcntl.flock(owner, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    except OSError:  # a file system without locks
-        pass
-    return True
-
-
-def _sweep(folder: Path) -> None:
-    """Remove stages of killed processes: those whose lock is free."""
-    if fcntl is None:
-        return
-    for stage in folder.glob(".pendmap-*.part"):
-        if not _STAGE.fullmatch(stage.name) or stage.is_symlink():
-            continue
-        with contextlib.suppress(OSError):
-            if not (stage / _OWNER).exists():
-                stage.rmdir()  # only if nothing is in it
-                continue
-            with (stage / _OWNER).open("r+b") as owner:
-                fcntl.flock(owner, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                _put_back(stage)
-                _remove(stage)
+        raise OSError(errno.ENOLCK, "this system has no locks")
+    fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def _put_back(stage: Path) -> None:
-    """Restore a folder that was moved into a stage and not replaced."""
-    for old in (stage / "old").glob("*"):
+    """Put back a folder that was moved into a stage and not replaced."""
+    for old in stage.glob("old/*"):
         if not (stage.parent / old.name).exists():
             old.rename(stage.parent / old.name)
-
-
-def _remove(stage: Path) -> None:
-    """Remove a stage, its lock last, so that a partial removal can be swept later."""
-    for entry in stage.iterdir():
-        if entry.is_dir() and not entry.is_symlink():
-            shutil.rmtree(entry, ignore_errors=True)
-        elif entry.name != _OWNER:
-            entry.unlink(missing_ok=True)
-    with contextlib.suppress(OSError):
-        (stage / _OWNER).unlink()
-        stage.rmdir()

@@ -38,21 +38,16 @@ def toml_text(content: Mapping[str, Any]) -> str:
 
     Raises TypeError or ValueError for values that TOML does not have.
     """
-    lists = {key for key, value in content.items() if _is_tables(value)}
-    tables = {key for key, value in content.items() if isinstance(value, Mapping)}
-    head = {key: value for key, value in content.items() if key not in lists | tables}
-    blocks = [tomli_w.dumps(head)] if head else []
+    plain: dict[str, Any] = {}
+    blocks: list[str] = []
     for key, value in content.items():
-        if key in lists:
-            blocks += [_entry(key, table) for table in value]
-        elif key in tables:
+        if isinstance(value, Mapping):
             blocks.append(tomli_w.dumps({key: value}))
-    return "\n".join(blocks)
-
-
-def _is_tables(value: object) -> bool:
-    """Return whether a value is a list of tables."""
-    return isinstance(value, list) and bool(value) and all(isinstance(v, Mapping) for v in value)
+        elif isinstance(value, list) and value and all(isinstance(v, Mapping) for v in value):
+            blocks += [_entry(key, table) for table in value]
+        else:
+            plain[key] = value
+    return "\n".join([*([tomli_w.dumps(plain)] if plain else []), *blocks])
 
 
 def _entry(name: str, table: Mapping[str, Any]) -> str:
@@ -70,9 +65,8 @@ def _entry(name: str, table: Mapping[str, Any]) -> str:
 def _value(value: object) -> str:
     """Return the TOML of a value on one line."""
     if isinstance(value, Mapping):
-        keys = {key: tomli_w.dumps({key: 0}).removesuffix(" = 0\n") for key in value}
-        inside = ", ".join(f"{keys[key]} = {_value(part)}" for key, part in value.items())
-        return f"{{ {inside} }}" if inside else "{}"
+        inside = (f"{tomli_w.dumps({k: 0})[:-5]} = {_value(part)}" for k, part in value.items())
+        return f"{{ {', '.join(inside)} }}" if value else "{}"
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(_value, value))}]"
     return tomli_w.dumps({"x": value}).removeprefix("x = ").removesuffix("\n")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any, Final
 
@@ -20,11 +21,10 @@ from pendmap.identification.fit import refuse_astray
 from pendmap.identification.methods.base import Identification
 from pendmap.identification.methods.registry import (
     BEST,
+    apply_method,
     check_names,
     identify_peaks,
-    identify_record,
 )
-from pendmap.identification.methods.start import TooShortError
 from pendmap.identification.methods.trajectory import (
     JointFit,
     fit_together,
@@ -32,13 +32,14 @@ from pendmap.identification.methods.trajectory import (
     physical,
 )
 from pendmap.identification.peaks import Peaks, find_peaks
-from pendmap.identification.readings import as_fit_run
 from pendmap.identification.report import DRAG, IdentificationReport
 from pendmap.identification.table1 import table_of_run
+from pendmap.identification.turning import TooShortError
 from pendmap.model import Rig
 from pendmap.model.effects import definition
 from pendmap.records import experiment_of
 from pendmap.records.summary import unit_wrong
+from pendmap.signal.robust import from_first
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -140,15 +141,7 @@ def identify(  # noqa: PLR0913 (each is asked for by name)
     >>> again.model == report.model
     True
     """
-    if theta is not None:
-        import pandas as pd  # noqa: PLC0415 (deferred import)
-
-        columns = {"t_s": np.asarray(records), "theta_rad": np.asarray(theta)}
-        shapes = [values.shape for values in columns.values()]
-        if len(shapes[0]) != 1 or shapes[1] != shapes[0]:
-            raise InputError(f"times and theta must be of one shape (N,), got {shapes}")
-        records = pd.DataFrame(columns)
-    experiment = experiment_of(records, rate_hz=rate_hz)
+    experiment = experiment_of(_as_records(records, theta), rate_hz=rate_hz)
     if start is not None:
         check_type("start", start, Rig, "pendmap.Rig(w0=6.2)")
     check_callable("progress", progress)
@@ -170,31 +163,42 @@ def identify(  # noqa: PLR0913 (each is asked for by name)
         table = table_of_run(run, peaks, results)
         return IdentificationReport(experiment, run, peaks, results, None, table)
     others = [name for name in names if name != BEST]
-    steps, before = len(names) + 2, len(names) - len(others) + 1
+    steps, done = len(names) + 2, itertools.count(1)
     report = progress or (lambda _done, _total: None)
     sigma, joint, results = None, None, {}
     if BEST in names:
         joint, results[BEST] = _best(experiment, run, start, effects)
+        report(next(done), steps)
         if joint is not None:
             sigma = joint.readings[0].sigma
-    report(before - 1, steps)
     peaks = find_peaks(run.time, run.theta, sigma=sigma, trusted=run.trusted)
-    report(before, steps)
-    rest = identify_record(
-        run.time,
-        run.theta,
-        sigma=sigma,
-        trusted=run.trusted,
-        methods=others,
-        peaks=peaks,
-        progress=lambda done, _total: report(before + done, steps),
-    )
-    results |= {name: one.with_clock(run.clock_stderr) for name, one in rest.items()}
+    report(next(done), steps)
+    time, first = from_first(run.time)
+    record = time[run.trusted], run.theta[run.trusted]
+    for name in others:
+        result = apply_method(name, peaks.later(-first), record)
+        results[name] = result.with_clock(run.clock_stderr)
+        report(next(done), steps)
     table = table_of_run(run, peaks, results)
     drag = None if joint is None or start is not None or effects else _with_drag(joint)
-    report(steps, steps)
+    report(next(done), steps)
     asked = tuple(effect if isinstance(effect, str) else effect.name for effect in effects)
     return IdentificationReport(experiment, run, peaks, results, joint, table, drag, asked)
+
+
+def _as_records(
+    records: Records | Sequence[Records] | ArrayLike, theta: ArrayLike | None
+) -> Records | Sequence[Records]:
+    """Return records, of times and angles as a DataFrame."""
+    if theta is None:
+        return records
+    import pandas as pd  # noqa: PLC0415 (deferred import)
+
+    columns = {"t_s": np.asarray(records), "theta_rad": np.asarray(theta)}
+    shapes = [values.shape for values in columns.values()]
+    if len(shapes[0]) != 1 or shapes[1] != shapes[0]:
+        raise InputError(f"times and theta must be of one shape (N,), got {shapes}")
+    return pd.DataFrame(columns)
 
 
 def _with_drag(joint: JointFit) -> JointFit | None:
@@ -224,7 +228,7 @@ def _best(
     if experiment.w0 is not None:
         known["w0"] = experiment.w0
     try:
-        joint = physical(fit_together(runs, start=start, known=known, effects=effects))
+        joint = physical(fit_together(runs, start=start or known, effects=effects))
     except TooShortError as error:
         if effects:
             raise
@@ -236,11 +240,7 @@ def _best(
         return None, Identification(BEST, warnings=(str(error),), applicable=False, converged=False)
     certain = joint.fit.converged or len(runs) > 1
     if certain and not unit_wrong(experiment, *runs):
-        refuse_astray(
-            experiment.path,
-            [as_fit_run(r, worth) for r, worth in zip(joint.runs, joint.readings, strict=True)],
-            joint.fit,
-        )
+        refuse_astray(experiment.path, joint.given, joint.fit)
     return joint, dataclasses.replace(identification_of(joint), method=BEST)
 
 

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats
 
 
+GROWTH: Final = 4.0  # Factor by which windows grow from stage to stage
 LEVEL: Final = 3.841458820694124  # 95 % point of chi-squared with one degree of freedom
 
 
@@ -89,7 +90,6 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
     hold: bool = False,
     steps: int = 40,
     least_gain: float = 1e-3,
-    growth: float = 4.0,
     target: float = math.inf,
 ) -> TrajectoryFit:
     """Return the pendulum that fits records best, by weighted least squares.
@@ -97,7 +97,7 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
     The sum over all samples of ``((reading - model) / sigma)**2`` is minimized over the free
     parameters and an initial state for each window (Bock 1983, Progress in Scientific Computing 2,
     95); for readings that are intervals the square is replaced by ``-2 log P``. Windows begin with
-    about one swing and grow by ``growth`` from stage to stage, to the whole record of a free decay;
+    about one swing and grow fourfold from stage to stage, to the whole record of a free decay;
     with ``windows`` of a former fit there is one stage. Intervals are profile-likelihood intervals
     (Venzon & Moolgavkar 1988, Applied Statistics 37, 87) for the names in ``profiled``, by default
     all.
@@ -119,7 +119,7 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
     choices = {
         "tolerance": tolerance_of(runs),
         "shortest": units.w0 * (math.tau / model.w0),
-        "growth": growth,
+        "growth": GROWTH,
         "steps": steps,
         "gain": least_gain,
         "hold": len([n for n in names if n.partition("[")[0] in free]) if hold else 0,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from scipy.special import ellipk
 
-from pendmap.identification.turning import End, release, rough_damping, stop
+from pendmap.identification.turning import End, release, rough_damping
 from pendmap.records.resolution import levels_shared
 from pendmap.signal.local_polynomial import fit_around
 
@@ -63,9 +63,7 @@ class Finder:
             if end is None or (result and not end.resolved_from(result[-1])):
                 continue
             result.append(end)
-        end = stop(self.time, self.theta, self.sigma, self.course, result)
-        result = self._in_time(result)
-        return result if end is None else [*result, end]
+        return self._in_time(result)
 
     @staticmethod
     def _in_time(ends: list[End]) -> list[End]:
@@ -96,7 +94,7 @@ class Finder:
             fit = fit_around(
                 self.time, self.theta, time, half, (0, 1, 2, 3, 4), sigma=self.sigma, begin=begin
             )
-            instant = None if fit is None else fit.turn()
+            instant = None if fit is None else fit.root(1)
             if instant is None:
                 return None
             near, time = time, instant
@@ -144,7 +142,7 @@ class Finder:
         """Return times of zero crossings between two peaks, their errors and half cycles."""
         rows = []
         for (before, after), k in zip(itertools.pairwise(self.ends), index[:-1], strict=True):
-            if after.kind == "stop" or before.angle * after.angle >= 0:
+            if before.angle * after.angle >= 0:
                 continue
             inside = self._between(before.time, after.time)
             if inside.stop - inside.start < 3:  # noqa: PLR2004
@@ -154,9 +152,9 @@ class Finder:
             fit, time = None, float(self.time[k0])
             for _ in range(2):
                 fit = fit_around(self.time, self.theta, time, half, (0, 1, 2, 3), sigma=self.sigma)
-                root = None if fit is None else fit.zero()
+                root = None if fit is None else fit.root()
                 time = time if root is None else root
-            if fit is None or fit.zero() is None:
+            if fit is None or fit.root() is None:
                 continue
             (_, gain), (speed, _) = fit.at(time), fit.at(time, 1)
             rows.append((time, gain * self._effective(fit) / abs(speed), k))

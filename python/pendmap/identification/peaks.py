@@ -11,17 +11,15 @@ import numpy as np
 from scipy.special import ellipk
 
 from pendmap.errors import InputError
-from pendmap.identification.coarse_finder import coarse_finder, is_coarse
 from pendmap.identification.peak_finder import Finder
-from pendmap.identification.readings import reading_of
-from pendmap.identification.turning import outline
+from pendmap.identification.readings import FEWEST_A_PERIOD, reading_of
+from pendmap.identification.turning import outline, samples_per_period
 from pendmap.records.samples import measured
 from pendmap.signal.robust import from_first
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from pendmap.identification.coarse_finder import CoarseFinder
     from pendmap.identification.turning import End
     from pendmap.signal import Floats, Mask
 
@@ -44,13 +42,15 @@ class Peaks:
     index : array of int, shape (P,)
         Number ``k`` of the peak; numbers are missing at gaps of the record.
     kind : tuple of str
-        ``release``, ``turn``, ``clipped``, or ``stop``, at which the pendulum comes to rest.
+        ``release``, ``turn`` or ``clipped``.
     crossing_time, crossing_stderr : array, shape (C,)
         Times of the crossings and their standard errors, s.
     crossing_index : array of int, shape (C,)
         Number of the half cycle of each crossing.
     sigma : float
         Standard deviation of a sample's noise from which errors are computed, rad.
+    lacking : str
+        Reason why peaks cannot be found in a record; empty otherwise.
     """
 
     time: Floats
@@ -65,17 +65,11 @@ class Peaks:
         default_factory=lambda: np.empty(0, np.int64)
     )
     sigma: float = 0.0
+    lacking: str = ""
 
     @classmethod
-    def of(
-        cls,
-        time: ArrayLike,
-        amplitude: ArrayLike,
-        *,
-        stderr_time: float = 0.0,
-        stderr_amplitude: float = 0.0,
-    ) -> Peaks:
-        """Return peaks from given times and amplitudes; absolute values get alternating signs."""
+    def of(cls, time: ArrayLike, amplitude: ArrayLike) -> Peaks:
+        """Return peaks of given times and amplitudes; absolute values get alternating signs."""
         t, a = np.asarray(time, float), np.asarray(amplitude, float)
         if t.ndim != 1 or t.shape != a.shape:
             raise InputError(
@@ -83,9 +77,8 @@ class Peaks:
             )
         if a.size > 1 and np.all(a[:-1] > 0):
             a = a * (-1.0) ** np.arange(a.size)
-        index = np.arange(t.size)
-        errors = np.full(t.size, stderr_time), np.full(t.size, stderr_amplitude)
-        return cls(t, a, *errors, index, ("turn",) * t.size)
+        none = np.zeros(t.size)
+        return cls(t, a, none, none, np.arange(t.size), ("turn",) * t.size)
 
     def __len__(self) -> int:
         return self.time.size
@@ -102,8 +95,8 @@ class Peaks:
 
     @property
     def turned(self) -> Peaks:
-        """Releases and turning points, without stops and clipped peaks."""
-        return self.select(np.array([kind in {"release", "turn"} for kind in self.kind], bool))
+        """Releases and turning points, without clipped peaks."""
+        return self.select(np.array([kind != "clipped" for kind in self.kind], bool))
 
     def later(self, seconds: float) -> Peaks:
         """Return the peaks with all times shifted by ``seconds``."""
@@ -117,24 +110,6 @@ class Peaks:
         some = {name: getattr(self, name)[which] for name in names}
         kind = tuple(k for k, keep in zip(self.kind, which, strict=True) if keep)
         return dataclasses.replace(self, **some, kind=kind)
-
-
-def samples(
-    time: ArrayLike, theta: ArrayLike, trusted: ArrayLike | None = None
-) -> tuple[Floats, Floats]:
-    """Return the trusted samples; InputError if they are not finite or times do not increase."""
-    t, x = np.asarray(time, float), np.asarray(theta, float)
-    good = np.ones(t.shape, bool) if trusted is None else np.asarray(trusted, bool)
-    if t.ndim != 1 or t.shape != x.shape or t.shape != good.shape:
-        raise InputError(
-            f"time, theta, trusted must be rows, got {t.shape}, {x.shape}, {good.shape}"
-        )
-    t, x = t[good], x[good]
-    if not (np.isfinite(t).all() and np.isfinite(x).all()):
-        raise InputError("time and theta must be finite numbers where trusted, one is not")
-    if np.any(np.diff(t) <= 0):
-        raise InputError("time must increase, it does not")
-    return t, x
 
 
 def find_peaks(
@@ -155,11 +130,6 @@ def find_peaks(
     and a fifth of it is added to the error. The mean excess of the maximum of a noisy curve,
     ``stderr(v)^2 / (2 abs(theta''))``, is subtracted from amplitudes.
 
-    With fewer than 20 samples per period of small swings, solutions of ``th'' + c_over_m th' + Tr
-    sgn(th') + w0^2 sin(th - zero) = 0`` are fitted to the samples within half a swing, with
-    parameters shared by 12 consecutive turns. Errors include the noise, the errors of these
-    parameters, and the misfit of the model.
-
     Parameters
     ----------
     time, theta : array, shape (N,)
@@ -172,7 +142,7 @@ def find_peaks(
     Returns
     -------
     Peaks
-        Empty if the record does not swing.
+        Empty if the record does not swing, or has fewer than 20 samples per period of small swings.
 
     Raises
     ------
@@ -185,33 +155,39 @@ def find_peaks(
     errors are computed with three independent samples per count in the window. Interpolated samples
     between readings are not used.
     """
-    t, x = samples(time, theta, trusted)
-    t, first = from_first(t)
+    t, x = np.asarray(time, float), np.asarray(theta, float)
+    good = np.ones(t.shape, bool) if trusted is None else np.asarray(trusted, bool)
+    if t.ndim != 1 or t.shape != x.shape or t.shape != good.shape:
+        raise InputError(
+            f"time, theta, trusted must be rows, got {t.shape}, {x.shape}, {good.shape}"
+        )
+    (t, first), x = from_first(t[good]), x[good]
+    if not (np.isfinite(t).all() and np.isfinite(x).all()):
+        raise InputError("time and theta must be finite numbers where trusted, one is not")
+    if np.any(np.diff(t) <= 0):
+        raise InputError("time must increase, it does not")
     drawn = measured(t, x)
     if drawn is not None:
         t, x = t[drawn.places], x[drawn.places]
-    finder, noise = _finder(t, x, sigma)
-    if finder is None:
-        return dataclasses.replace(Peaks.of((), ()), sigma=noise)
+    reading = reading_of(t, x, sigma)
+    none = dataclasses.replace(Peaks.of((), ()), sigma=reading.sigma)
+    count = samples_per_period(t, x)
+    if count < FEWEST_A_PERIOD:
+        few = f"{count:.3g} samples a period, {FEWEST_A_PERIOD:.3g} are needed for peaks"
+        return dataclasses.replace(none, lacking=few)
+    course = outline(t, x, reading.sigma)
+    if course is None:
+        return none
+    finder = Finder(t, x, reading, course)
     ends = finder.ends
     index = _numbered(ends, finder.w0)
     columns = np.array([(e.time, e.angle, e.stderr_time, e.stderr_angle) for e in ends])
     instant, angle, stderr_time, stderr_angle = columns.reshape(-1, 4).T.copy()
     kind, crossings = tuple(e.kind for e in ends), finder.crossings(index)
-    peaks = Peaks(instant, angle, stderr_time, stderr_angle, index, kind, *crossings, sigma=noise)
+    peaks = Peaks(
+        instant, angle, stderr_time, stderr_angle, index, kind, *crossings, sigma=reading.sigma
+    )
     return peaks.later(first)
-
-
-def _finder(
-    time: Floats, theta: Floats, sigma: float | None
-) -> tuple[Finder | CoarseFinder | None, float]:
-    """Return the finder for the sampling rate, None without swings; and the noise."""
-    if is_coarse(time, theta):
-        coarse = coarse_finder(time, theta, sigma)
-        return (None if coarse.course is None else coarse), coarse.sigma
-    reading = reading_of(time, theta, sigma)
-    course = outline(time, theta, reading.sigma)
-    return (None if course is None else Finder(time, theta, reading, course)), reading.sigma
 
 
 def _numbered(ends: list[End], w0: float) -> NDArray[np.int64]:
@@ -221,7 +197,7 @@ def _numbered(ends: list[End], w0: float) -> NDArray[np.int64]:
         mean = min((abs(before.angle) + abs(after.angle)) / 2, 3.1)
         half = 2 * float(ellipk(math.sin(mean / 2) ** 2)) / w0
         cycles = (after.time - before.time) / half
-        odd = before.angle * after.angle < 0 or after.kind == "stop"
+        odd = before.angle * after.angle < 0
         steps = 2 * round((cycles - 1) / 2) + 1 if odd else 2 * round(cycles / 2)
         result.append(result[-1] + max(steps, 1))
     return np.array(result, np.int64)

@@ -1,4 +1,4 @@
-"""Natural frequency from times and amplitudes of peaks; envelope of peaks by energy balance."""
+"""Natural frequency from times and amplitudes of peaks; work of viscous damping."""
 
 from __future__ import annotations
 
@@ -71,9 +71,6 @@ def frequency(peaks: Peaks, *, zeta: float = 0.0, offset: float = 0.0) -> Freque
     return Frequency(w0, math.sqrt(float(covariance[0, 0])) * w0**2 * root, misfit)
 
 
-_ROUNDS = 4  # Iterations of each half cycle's energy balance
-
-
 def viscous_work(amplitude: Floats) -> Floats:
     """Return ``int th'^2 dt / w0`` over a half cycle of a pendulum of this amplitude, rad^2.
 
@@ -82,26 +79,3 @@ def viscous_work(amplitude: Floats) -> Floats:
     half = np.minimum(np.abs(amplitude), math.pi - 1e-9) / 2
     m, rest = np.sin(half) ** 2, np.cos(half) ** 2
     return np.asarray(8 * (ellipe(m) - rest * ellipkm1(rest)))
-
-
-def envelope(first: Floats, gamma: Floats, theta_r: Floats, count: int) -> Floats:
-    """Return the absolute values of successive peaks, shape (count, ...).
-
-    Each half cycle loses ``cos B - cos A = gamma W((A + B)/2) + theta_r (A + B)`` with the work
-    ``W`` of :func:`viscous_work`: first order in the damping, any amplitude, ``gamma = c_over_m /
-    w0``, ``theta_r = Tr / w0^2``. Peaks are 0 after friction stops a half cycle before zero.
-    """
-    a, damping, friction = np.broadcast_arrays(
-        np.abs(np.asarray(first, float)), np.asarray(gamma, float), np.asarray(theta_r, float)
-    )
-    result = np.empty((count, *a.shape))
-    result[0] = a
-    for k in range(1, count):
-        before = result[k - 1]
-        after = before
-        for _ in range(_ROUNDS):
-            both = before + after
-            energy = np.cos(before) + damping * viscous_work(both / 2) + friction * both
-            after = np.arccos(np.clip(energy, -1.0, 1.0))
-        result[k] = np.where(after > 0, after, 0.0)
-    return result

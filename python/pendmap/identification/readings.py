@@ -8,8 +8,12 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.identification.coarse_finder import coarse_finder, is_coarse
+from pendmap.errors import FitDiverged
+from pendmap.identification.fit import fit_runs
+from pendmap.identification.parameters import OFFSET, OPPOSING
 from pendmap.identification.runs import FitRun, Pivot, RodSensor
+from pendmap.identification.turning import rough_start, samples_per_period
+from pendmap.model import Effect, Rig
 from pendmap.records.noise import noise_of
 from pendmap.records.resolution import step_of
 from pendmap.signal.robust import from_first
@@ -23,6 +27,9 @@ if TYPE_CHECKING:
 DITHERED: Final = 0.45
 """Noise (with rounding) over the count below which errors are correlated: intervals are fitted."""
 
+
+FEWEST_A_PERIOD: Final = 20.0
+"""Fewest samples per period of small swings for polynomials: a quartic has nine in a window."""
 
 QUANTITIES: Final = {"m/s2": "acceleration", "m/s": "velocity", "m": "position"}
 """Quantity of a recorded motion of the pivot, by its unit."""
@@ -64,7 +71,7 @@ def reading_of(
     """Return the standard errors of readings (rad, at times in s), from the trusted ones.
 
     The noise is that of :func:`pendmap.noise_floor`, with its growth with speed if any. With few
-    samples per period it is the residual of fitted pendulum swings, if that is less. It is at least
+    samples per period it is that of :func:`_noise_of_swings`, if that is less. It is at least
     ``count / sqrt(12)``. ``sigma`` and ``count`` (rad) are estimated unless they are given.
     """
     if count is None:
@@ -77,9 +84,8 @@ def reading_of(
         law = floor.law
         doubt = min(floor.stderr / floor.sigma, 1.0) if known else 1.0
         use = np.ones(time.size, bool) if trusted is None else trusted
-        if known and is_coarse(time[use], theta[use]):
-            # With few samples the residual of a polynomial contains motion.
-            left = coarse_finder(time[use], theta[use], None).sigma
+        if known and samples_per_period(time[use], theta[use]) < FEWEST_A_PERIOD:
+            left = _noise_of_swings(time[use], theta[use], sigma)
             if left < sigma:
                 sigma, law = left, None
     least = max(count / math.sqrt(12), 1e-15)
@@ -89,6 +95,26 @@ def reading_of(
         return Reading(sigma, count, np.full(theta.shape, sigma), doubt, coarse)
     sigmas = np.maximum(law.sigma(time, theta), least)
     return Reading(sigma, count, sigmas, doubt, coarse, law, law.shift(time, theta))
+
+
+def _noise_of_swings(time: Floats, theta: Floats, sigma: float) -> float:
+    """Return the noise of few samples per period, which polynomials do not follow, rad.
+
+    It is the residual of a pendulum with friction in windows of one swing, with an initial state
+    each; ``sigma``, an upper limit, is returned without a fit.
+    """
+    start = rough_start(time, theta, sigma)
+    if start is None:
+        return sigma
+    run = FitRun(time, theta, sigma, longest_s=math.tau / start["w0"])
+    w0, c_over_m, friction = (start[name] for name in ("w0", *OPPOSING))
+    model = Rig(w0, c_over_m, friction, effects=(Effect(OFFSET, {"d": 0.0}),))
+    try:
+        fit = fit_runs([run], model, ["w0", *OPPOSING, f"{OFFSET}.d"], profiled=())
+    except FitDiverged:
+        return sigma
+    freedom = fit.samples - 2 * len(fit.windows) - len(fit.names)
+    return fit.rms * math.sqrt(fit.samples / freedom) if freedom > 0 else sigma
 
 
 def as_fit_run(run: Run, reading: Reading) -> FitRun:

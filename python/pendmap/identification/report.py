@@ -10,9 +10,8 @@ import numpy as np
 
 from pendmap.errors import InputError
 from pendmap.formatting import counted, estimate_text, interval, percent
-from pendmap.identification.methods.trajectory import OFFSET, identification_of
-from pendmap.identification.parameters import SENSOR
-from pendmap.identification.readings import as_fit_run
+from pendmap.identification.methods.trajectory import identification_of
+from pendmap.identification.parameters import OFFSET, SENSOR
 from pendmap.identification.results import FitResult, Followed
 from pendmap.records.summary import doubts, finding_lines
 
@@ -93,7 +92,7 @@ class IdentificationReport(FitResult):
     def text_parts(self) -> tuple[list[tuple[list[str], list[list[str]]]], list[str]]:
         """Return the tables and lines that ``pendmap identify`` prints."""
         tables = [methods_table(self), table1_table(self)]
-        return tables, list(as_text(self))
+        return tables, as_text(self)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -114,9 +113,7 @@ class IdentificationReport(FitResult):
         """Return the fit of the trajectory method."""
         if self.joint is None:
             raise InputError(f"{self.run.name}: the trajectory method must have fitted it")
-        pairs = zip(self.joint.runs, self.joint.readings, strict=True)
-        fitted = [as_fit_run(run, reading) for run, reading in pairs]
-        return Followed(self.joint.fit, fitted, self.joint.runs)
+        return Followed(self.joint.fit, self.joint.given, self.joint.runs)
 
     @property
     def sound(self) -> Identification | None:
@@ -262,7 +259,7 @@ def _runs(report: IdentificationReport) -> list[dict[str, Any]]:
 
 
 def _method(result: Identification) -> dict[str, Any]:
-    known = {**result.estimates, **result.derived}
+    known = result.parameters
     names = list(dict.fromkeys([*COLUMNS, *known]))
     entry: dict[str, Any] = {name: known[name].value if name in known else None for name in names}
     return entry | {
@@ -275,41 +272,22 @@ def _method(result: Identification) -> dict[str, Any]:
     }
 
 
-def _drag(report: IdentificationReport) -> Iterator[str]:
-    """Yield the line on the gain by quadratic drag, if it was fitted."""
-    if report.with_drag is None or report.joint is None:
-        return
-    drag = identification_of(report.with_drag)
-    name = next(n for n in drag.estimates if n.startswith(DRAG))
-    yield (
-        f"With {DRAG} ({name.partition('.')[2]} = {estimate_text(drag.estimates[name])}) the "
-        f"residual is {report.with_drag.fit.rms:.3g} rad, {report.joint.fit.rms:.3g} without: "
-        f"--effect {DRAG} fits it, diagnose looks for more"
-    )
-
-
-def as_text(report: IdentificationReport) -> Iterator[str]:
-    """Yield the lines printed with the tables: doubts, intervals, warnings, findings."""
-    for text in foremost(report):
-        yield f"Warning: {text}"
-    best = report.sound
-    if best is not None:
-        yield f"{best.method}: {best.used}"
-        for name, estimate in {**best.estimates, **best.derived}.items():
-            if estimate.ci95 is not None:
-                yield f"  {name} = {estimate_text(estimate)}, 95 % in {interval(estimate)}"
-    yield from _drag(report)
+def as_text(report: IdentificationReport) -> list[str]:
+    """Return the lines of the short text, intervals, all methods' warnings, and all findings."""
+    best, lines = report.sound, list(in_short(report))
+    for name, estimate in {} if best is None else best.parameters.items():
+        if estimate.ci95 is not None:
+            lines.append(f"  {name} = {estimate_text(estimate)}, 95 % in {interval(estimate)}")
     if report.table.left_out:
-        yield f"{report.run.name}: {report.table.left_out}"
-    runs_text = left_out(report.experiment, report.runs)
-    if runs_text:
-        yield runs_text
+        lines.append(f"{report.run.name}: {report.table.left_out}")
     for name, result in report.methods.items():
-        for warning in result.warnings:
-            yield f"{name}: {warning}"
+        if result is not best and not report.peaks.lacking:
+            lines += [f"{name}: {warning}" for warning in result.warnings]
         if name in report.table.lost:
-            yield f"{name}: not simulated from the first peak: {report.table.lost[name]}"
-    yield from finding_lines(report.experiment, *report.runs)
+            why = report.table.lost[name]
+            lines.append(f"{name}: not simulated from the first peak: {why}")
+    lines += finding_lines(report.experiment, *report.runs)
+    return list(dict.fromkeys(lines))
 
 
 def in_short(report: IdentificationReport) -> Iterator[str]:
@@ -317,13 +295,12 @@ def in_short(report: IdentificationReport) -> Iterator[str]:
     best = report.sound
     yield from (f"Warning: {text}" for text in foremost(report))
     if best is not None:
-        known = {**best.estimates, **best.derived}
         names = [*_SHORT, *(n for n in best.estimates if n not in (*COLUMNS, *_SHORT))]
         yield ", ".join(
-            f"{_SHORT.get(name, (name, ''))[0]} = {estimate_text(known[name])}"
+            f"{_SHORT.get(name, (name, ''))[0]} = {estimate_text(best.parameters[name])}"
             f" {_SHORT.get(name, (name, ''))[1]}".rstrip()
             for name in names
-            if name in known
+            if name in best.parameters
         )
         yield f"{best.method}: {best.used}"
     runs_text = left_out(report.experiment, report.runs)
@@ -331,7 +308,14 @@ def in_short(report: IdentificationReport) -> Iterator[str]:
         yield runs_text
     yield from finding_lines(report.experiment, *report.runs, changes=True)
     yield from (f"Warning: {text}" for text in (() if best is None else best.warnings))
-    yield from _drag(report)
+    if report.with_drag is not None and report.joint is not None:
+        drag = identification_of(report.with_drag)
+        name = next(n for n in drag.estimates if n.startswith(DRAG))
+        yield (
+            f"With {DRAG} ({name.partition('.')[2]} = {estimate_text(drag.estimates[name])}) the "
+            f"residual is {report.with_drag.fit.rms:.3g} rad, {report.joint.fit.rms:.3g} without: "
+            f"--effect {DRAG} fits it, diagnose looks for more"
+        )
 
 
 def foremost(report: IdentificationReport) -> list[str]:
@@ -347,7 +331,7 @@ def methods_table(report: IdentificationReport) -> tuple[list[str], list[list[st
     names = [*COLUMNS, *extra]
     rows = []
     for method, result in report.methods.items():
-        known = {**result.estimates, **result.derived}
+        known = result.parameters
         shown = [estimate_text(known[name]) if name in known else "" for name in names]
         if not result.applicable:
             shown = ["not applicable", *[""] * (len(names) - 1)]

@@ -10,14 +10,14 @@ import numpy as np
 
 from pendmap.analysis.trajectory import simulate
 from pendmap.errors import InputError
-from pendmap.identification.peaks import Peaks, find_peaks
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
 
     from pendmap.identification.methods.base import Identification
+    from pendmap.identification.peaks import Peaks
     from pendmap.model import Rig
     from pendmap.records import Run
     from pendmap.signal import Floats
@@ -163,13 +163,10 @@ def errors_of(method: str, peaks: Peaks, times: Floats, angles: Floats) -> PeakE
     )
 
 
-def table1(  # noqa: PLR0913 (record, models, rows)
-    time: ArrayLike,
-    theta: ArrayLike,
+def table1(
+    record_peaks: Peaks,
     identifications: Mapping[str, Identification],
     *,
-    sigma: float | None = None,
-    trusted: ArrayLike | None = None,
     periods: Sequence[float] = PERIODS,
     peaks: Sequence[float] = PEAKS,
 ) -> Table1:
@@ -177,14 +174,10 @@ def table1(  # noqa: PLR0913 (record, models, rows)
 
     Parameters
     ----------
-    time, theta : array, shape (N,)
-        Times, s, and angles from the downward rest, rad, unwrapped.
+    record_peaks : Peaks
+        Peaks of the record, as from :func:`pendmap.identification.find_peaks`.
     identifications : mapping of str to Identification
         ``methods`` of :func:`pendmap.identify`; inapplicable ones are ignored.
-    sigma : float, optional
-        Noise of a sample, rad; by default estimated.
-    trusted : array of bool, shape (N,), optional
-        Samples that may be used.
     periods, peaks : sequence of float
         Rows of the table: the measured period (s) or peak (rad) nearest to each is used.
 
@@ -196,20 +189,8 @@ def table1(  # noqa: PLR0913 (record, models, rows)
     ----------
     Horton, Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A, table 1 and figure 7.
     """
-    record_peaks = find_peaks(time, theta, sigma=sigma, trusted=trusted)
-    return table_of(record_peaks, identifications, periods=periods, peaks=peaks)
-
-
-def table_of(
-    record_peaks: Peaks,
-    identifications: Mapping[str, Identification],
-    *,
-    periods: Sequence[float] = PERIODS,
-    peaks: Sequence[float] = PEAKS,
-) -> Table1:
-    """Return table 1 of given peaks; see :func:`table1`."""
     if len(record_peaks.turned) < 3:  # noqa: PLR2004 (one full cycle)
-        return Table1((), {})
+        return Table1((), {}, record_peaks.lacking)
     start = first_state(record_peaks)
     errors, lost = {}, {}
     for name, identification in identifications.items():
@@ -231,19 +212,14 @@ def table_of_run(run: Run, peaks: Peaks, identifications: Mapping[str, Identific
     """Return table 1 of a run; empty if its angle was computed from an acceleration."""
     if run.accelerometer is not None:
         return Table1((), {}, ROUGH)
-    return table_of(peaks, identifications)
+    return table1(peaks, identifications)
 
 
 def _row(what: str, asked: float, errors: Mapping[str, PeakErrors]) -> Row | None:
     """Return the row of the measured value nearest to ``asked``; None if there is none."""
-    column, measured = {}, math.nan
-    for name, method_errors in errors.items():
-        peak = what == "peak"
-        there, wrong = (
-            (method_errors.peak, method_errors.peak_error)
-            if peak
-            else (method_errors.period, method_errors.period_error)
-        )
+    column, measured, peak = {}, math.nan, what == "peak"
+    for name, one in errors.items():
+        there, wrong = (one.peak, one.peak_error) if peak else (one.period, one.period_error)
         if there.size == 0:
             return None
         # A period below all measured ones would select the last, noisiest ones.

@@ -1,4 +1,4 @@
-"""Approximate turning points of a record, its release and stop, and starting values of a fit."""
+"""Approximate turning points of a record, its release, and starting values of a fit."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from scipy.ndimage import median_filter
-from scipy.optimize import minimize_scalar, nnls
+from scipy.optimize import nnls
 from scipy.special import ellipe, ellipk
 
+from pendmap.errors import InputError
 from pendmap.records.resolution import step_of
-from pendmap.signal.half_cycles import swings
+from pendmap.signal.half_cycles import after_turns, swings
 from pendmap.signal.local_polynomial import fit_around
 
 if TYPE_CHECKING:
@@ -26,13 +27,11 @@ _GAP: Final = 10.0  # Shortest gap, sampling intervals, before the period is kno
 
 @dataclasses.dataclass(frozen=True)
 class Outline:
-    """Outline of a record of N samples: approximate turns, period and rest."""
+    """Outline of a record of N samples: approximate turns and period."""
 
     turns: Indices  # samples at turns of the smoothed angle, alternately maxima and minima
     period: float  # period of the late swings, s
     smooth: Floats  # running mean of the angle, rad, shape (N,)
-    noise: float  # standard error of smooth, rad
-    rest: int | None  # first sample of the final rest
     left: int  # first sample that is off the initial level
 
 
@@ -49,7 +48,7 @@ def outline(time: Floats, theta: Floats, sigma: float) -> Outline | None:
     span = float(np.ptp(calm))
     steps = np.diff(time)
     gaps = np.flatnonzero(steps > _GAP * float(np.median(steps))) + 1
-    rough = zigzags(calm, max(8 * sigma + 2 * step, 1e-6 * span), gaps)
+    rough = _zigzags(calm, max(8 * sigma + 2 * step, 1e-6 * span), gaps)
     if rough.size < 2:  # noqa: PLR2004 (a half cycle lies between two)
         return None
     halves = np.diff(time[rough])
@@ -60,19 +59,18 @@ def outline(time: Floats, theta: Floats, sigma: float) -> Outline | None:
     gaps = np.flatnonzero(steps > _SMOOTHING * period) + 1
     # Near the end the mean has fewer samples: its turns there are noise.
     ahead = int(np.searchsorted(time, time[-1] - _SMOOTHING * period))
-    turns = zigzags(smooth[:ahead], _SURE * noise + 0.5 * step, gaps[gaps < ahead])
+    turns = _zigzags(smooth[:ahead], _SURE * noise + 0.5 * step, gaps[gaps < ahead])
     turns = _far_apart(turns, time, period)
     level = float(np.median(smooth[time > time[-1] - 0.5 * period]))
     off = np.flatnonzero(np.abs(smooth[:ahead] - level) > 4 * noise + 0.5 * step)
-    rest = int(off[-1]) + 1 if off.size and time[-1] - time[off[-1]] > 0.75 * period else None
-    if rest is not None:
-        turns = turns[turns < rest]
+    if off.size and time[-1] - time[off[-1]] > 0.75 * period:
+        turns = turns[turns <= off[-1]]
     if turns.size < 2:  # noqa: PLR2004
         return None
     # Three consecutive samples are required: a single one is an outlier.
     away = np.abs(theta - float(np.median(theta[:3]))) > _SURE * sigma + step
     runs = away[:-2] & away[1:-1] & away[2:]
-    return Outline(turns, period, smooth, noise, rest, int(np.argmax(runs)))
+    return Outline(turns, period, smooth, int(np.argmax(runs)))
 
 
 def _running_mean(time: Floats, x: Floats, half: float) -> tuple[Floats, float]:
@@ -111,7 +109,7 @@ def _zigzag(x: Floats, threshold: float) -> Indices:
     return np.array(extremes, dtype=np.intp)
 
 
-def zigzags(x: Floats, threshold: float, gaps: Indices) -> Indices:
+def _zigzags(x: Floats, threshold: float, gaps: Indices) -> Indices:
     """Return the extremes of each part between gaps, without samples next to gaps."""
     begins = np.concatenate(([0], gaps))
     parts = [_zigzag(part, threshold) for part in np.split(x, gaps)]
@@ -130,8 +128,7 @@ def _far_apart(turns: Indices, time: Floats, period: float) -> Indices:
 
 
 _RESOLVED: Final = 8.0  # Least difference between successive peaks, standard errors
-_SURE_END: Final = 4.0
-"""Standard errors above which a velocity at the release, or a displacement to the stop, is real."""
+_SURE_SPEED: Final = 4.0  # Standard errors above which a velocity at the release is real
 _LATENESS: Final = 5 / 32
 """Half the slope at 0 of the quartic fitted to ``s abs(s)``, over the window's half-width."""
 _DOUBT: Final = 0.2  # Fraction of the delay by friction that is added to the error
@@ -147,7 +144,7 @@ class End:
     angle: float  # rad
     stderr_time: float
     stderr_angle: float
-    kind: str  # release, turn, clipped or stop
+    kind: str  # release, turn or clipped
     window: float = 0.0  # half-width of the fitted window, s
 
     def resolved_from(self, before: End) -> bool:
@@ -176,11 +173,10 @@ class End:
 def release(
     time: Floats, theta: Floats, sigma: float, scale: tuple[float, float], course: Outline
 ) -> End | None:
-    """Return the release from rest at the beginning of a record; None if it begins in motion.
+    """Return the release from rest at the first sample; None if the record begins otherwise.
 
-    Either the first sample is the release (then the angle is even about it), or the pendulum was
-    held (then a constant angle is followed by a fall with continuous velocity). ``scale`` is the
-    approximate natural frequency, rad/s, and the half-width of a window, s.
+    The angle is even about a release. ``scale`` is the approximate natural frequency, rad/s, and
+    the half-width of a window, s.
     """
     if course.left == 0:
         return None
@@ -190,75 +186,58 @@ def release(
     bend = w0**2 * max(math.sin(min(abs(level), math.pi)), 0.02)
     quick = math.sqrt(2 * (6 * sigma + 1e-9) / bend)
     half = max(half, 5.5 * step)
-    if leaves - time[0] > 2 * quick + 4 * step:
-        return _joined(time, theta, sigma, (float(time[0]), leaves, half), "release")
     even = fit_around(time, theta, float(time[0]), half, (0, 2, 4), sigma=sigma)
     moving = fit_around(time, theta, float(time[0]), half, (0, 1, 2, 4), sigma=sigma)
-    if even is None or moving is None:
+    if leaves - time[0] > 2 * quick + 4 * step or even is None or moving is None:
         return None
     # With a velocity, or a curvature away from the middle, the record begins in motion.
     (angle, gain), (bend, _) = even.at(float(time[0])), even.at(float(time[0]), 2)
     speed, speed_gain = moving.at(float(time[0]), 1)
     slack = _STILL * abs(angle) * w0
-    if bend * angle >= 0 or abs(speed) > _SURE_END * speed_gain * sigma + slack:
+    if bend * angle >= 0 or abs(speed) > _SURE_SPEED * speed_gain * sigma + slack:
         return None
     return End(float(time[0]), angle, step / 10, gain * sigma, "release")
 
 
-def stop(
-    time: Floats, theta: Floats, sigma: float, course: Outline, before: list[End]
-) -> End | None:
-    """Return the stop in the half cycle after the last turn; None if it is not resolved."""
-    if course.rest is None or not before:
-        return None
-    last, rests = before[-1], float(time[course.rest])
-    if not 0.1 < (rests - last.time) / course.period < 0.9:  # noqa: PLR2004 (a half, roughly)
-        return None
-    half = 0.25 * course.period
-    end = _joined(time[::-1] * -1.0, theta[::-1], sigma, (-time[-1], -rests, half), "stop")
-    if end is None or abs(end.angle - last.angle) < _SURE_END * last.stderr_angle:
-        return None
-    return dataclasses.replace(end, time=-end.time)
-
-
-def _joined(
-    time: Floats, theta: Floats, sigma: float, where: tuple[float, float, float], kind: str
-) -> End | None:
-    """Fit a constant level followed by ``level + b s^2 + d s^4``, with the time s since its end.
-
-    ``where`` is the start of the level, its approximate end, and the length of the fit after it.
-    """
-    begin, leaves, half = where
-    use = (time >= begin) & (time <= leaves + half)
-    t, x = time[use], theta[use]
-    if t.size < 6:  # noqa: PLR2004 (parameters and two more)
-        return None
-
-    def solved(instant: float) -> tuple[float, Floats, Floats]:
-        s = np.maximum(t - instant, 0.0) / half
-        rows = np.column_stack((np.ones_like(s), s**2, s**4))
-        inverse = np.asarray(np.linalg.pinv(rows.T @ rows, hermitian=True), np.float64)
-        coefficients = inverse @ (rows.T @ x)
-        residual = x - rows @ coefficients
-        return float(residual @ residual), coefficients, inverse
-
-    # The sum of squares has flat parts and local minima: a scan precedes the search.
-    scan = np.linspace(max(leaves - half, begin), leaves + half / 2, 61)
-    nearest = int(np.argmin([solved(float(at))[0] for at in scan]))
-    low, high = float(scan[max(nearest - 1, 0)]), float(scan[min(nearest + 1, 60)])
-    best = minimize_scalar(lambda at: solved(at)[0], bounds=(low, high), method="bounded")
-    at = float(best.x)
-    least, coefficients, inverse = solved(at)
-    # The curvature of the sum of squares gives the error of the instant.
-    shift = max((high - low) / 10, 1e-9)
-    curvature = (solved(at + shift)[0] - 2 * least + solved(at - shift)[0]) / shift**2
-    error = sigma * math.sqrt(2 / curvature) if curvature > 0 else half
-    level_error = sigma * math.sqrt(max(float(inverse[0, 0]), 0.0))
-    return End(at, float(coefficients[0]), min(error, half), level_error, kind)
-
-
 FEWEST_SWINGS: Final = 2  # Fewest half swings from which starting values are estimated
 QUIET: Final = 10.0  # Greatest range of readings at rest, standard errors
+
+
+class TooShortError(InputError):
+    """Error raised for a record with too few decaying half swings for starting values."""
+
+
+def swinging(time: Floats, theta: Floats) -> tuple[Floats, Floats]:
+    """Return times and angles after any rotations, in the turn in which the pendulum rests."""
+    rest = math.tau * round(float(np.median(theta[-max(theta.size // 4, 1) :])) / math.tau)
+    first = after_turns(theta - rest)
+    return time[first:], theta[first:] - rest
+
+
+def samples_per_period(time: Floats, theta: Floats) -> float:
+    """Return the number of samples per period of small swings; infinite if no swing is seen."""
+    if theta.size < _FEWEST:
+        return math.inf
+    time, theta = swinging(time, theta)
+    w0 = _natural_frequency(time, theta)
+    if w0 is None:
+        return math.inf
+    # The median removes single spikes, but also fast swings, which lowers the frequency.
+    calm = _natural_frequency(time, median_filter(theta, 5, mode="nearest"))
+    if calm is not None and calm < 0.6 * w0:
+        return math.inf
+    return math.tau / (w0 * float(np.median(np.diff(time))))
+
+
+def _natural_frequency(time: Floats, theta: Floats) -> float | None:
+    """Return the natural frequency from the turning points of large swings, rad/s."""
+    if time.size < _FEWEST:
+        return None
+    turns = _zigzag(theta, 0.1 * float(np.ptp(theta)) + 1e-12)
+    if turns.size < 3:  # noqa: PLR2004 (two half swings)
+        return None
+    size = np.minimum(np.abs(np.diff(theta[turns])) / 2, 3.1)
+    return float(np.median(2 * ellipk(np.sin(size / 2) ** 2) / np.diff(time[turns])))
 
 
 def rough_start(time: Floats, theta: Floats, sigma: float) -> dict[str, float] | None:
@@ -269,6 +248,7 @@ def rough_start(time: Floats, theta: Floats, sigma: float) -> dict[str, float] |
     integral of the velocity over the angle) and ``2 A Tr``. Swings below four ``sigma`` are
     excluded.
     """
+    time, theta = swinging(time, theta)
     tail = theta[-max(len(theta) // 10, 1) :]
     # Only the mean of readings at rest is their centre.
     centre = float(np.mean(tail)) if np.ptp(tail) < QUIET * sigma else 0.0

@@ -33,21 +33,14 @@ def propagated(function: Callable[[Floats], Floats], values: Floats, stderr: Flo
     return np.asarray(slopes * stderr**2 @ slopes.T)
 
 
-def bootstrap(
-    function: Callable[[Floats], Floats],
-    values: Floats,
-    stderr: Floats,
-    *,
-    draws: int = 1000,
-    seed: int = 0,
-) -> Floats:
-    """Return a function of normally distributed values, shape (draws, M); NaN where it fails.
+def bootstrap(function: Callable[[Floats], Floats], values: Floats, stderr: Floats) -> Floats:
+    """Return a function of normally distributed values, shape (1000, M); NaN where it fails.
 
     The parametric bootstrap is valid for functions that are nonlinear within the errors, unlike
     the delta method.
     """
-    rng = np.random.default_rng(seed)
-    scattered = values + stderr * rng.standard_normal((draws, values.size))
+    rng = np.random.default_rng(0)
+    scattered = values + stderr * rng.standard_normal((1000, values.size))
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.array([function(row) for row in scattered])
 

@@ -46,7 +46,7 @@ def _column(run: xr.Dataset, k: int) -> list[Panel]:
     clock = Axis(names.clock(units), (float(time[0]), float(time[-1])))
     history = Line(time, theta, colour=_INK, width=0.8)
     curve = plane.broken_at_wrap(whole["theta"].values, whole["velocity"].values)
-    sides = names.phase_plane((-math.pi, math.pi), plane.padded(run["velocity"].values), units)
+    sides = names.phase_plane((-math.pi, math.pi), holding(run["velocity"].values), units)
     section = run["section_theta"].values, run["section_velocity"].values
     up = Axis(names.ANGLE, holding(theta), "angle")
     return [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from typing import TYPE_CHECKING, Final
 
@@ -9,8 +10,9 @@ import numpy as np
 
 from pendmap.errors import InputError
 from pendmap.formatting import counted
-from pendmap.records.from_acceleration import angle_from
-from pendmap.records.rod_sensors import PLACE_EXAMPLE, angle_of_rate
+from pendmap.records.noise import noise_of
+from pendmap.records.rod_sensors import FEWEST_PEAKS, PLACE_EXAMPLE, angle_of_rate
+from pendmap.signal.half_cycles import swings
 from pendmap.signal.robust import normal_scale
 
 if TYPE_CHECKING:
@@ -24,44 +26,11 @@ WRAPPED_SPAN: Final = 1.01  # Greatest span of wrapped readings, turns: one turn
 WRAP_JUMP: Final = 0.75  # Least jump between neighbours that is a wrap, turns
 LARGEST_ANGLE: Final = 1e5  # Greatest plausible angle, rad: about 16,000 turns
 MOST_HUGE: Final = 0.5  # Share of implausible angles above which the column is refused
-GAUSS_NEWTON_STEPS: Final = 50  # Most iterations of the circle fit; five usually suffice
+LEAST_SWING: Final = 5.0  # Least reading of a swing, standard deviations of the noise
+LARGEST_READING: Final = 1.15  # Greatest reading, over the theoretical maximum: else wrong unit
+ONE_SIDED: Final = 0.15  # Smaller over larger side of the readings below which the axis is radial
+BLIND_SPOT: Final = 0.05  # Relative distance to the centre of oscillation that is refused
 RADIUS_DOUBT: Final = 0.02  # Relative standard error of the radius above which it is reported
-FEWEST_PEAKS: Final = 6  # Fewest readings in which a pattern of turning points is recognized
-KEEP_PATTERN: Final = 0.9  # Least share of readings that follow the pattern
-PEAK_RISE: Final = 0.02  # Greatest rise from one amplitude to the next, over the greatest amplitude
-PERIOD_CHANGE: Final = 0.15  # Greatest relative change between successive periods
-CLOCK_SPREAD: Final = 1e-4  # Relative spread of intervals below which sampling is by a clock
-
-
-def undeclared_peaks(work: Work) -> Finding | None:
-    """Report angles of a free record that look like turning points; exclude them from fits."""
-    good = np.isfinite(work.theta)
-    if not work.free or "angle" not in work.columns:
-        return None
-    pattern = _pattern(work.time[good], work.theta[good])
-    if not pattern:
-        return None
-    work.peaks_only = True
-    work.trusted[:] = False
-    return work.finding("peaks-undeclared", pattern=pattern, column=work.columns["angle"])
-
-
-def _pattern(time: Floats, theta: Floats) -> str:
-    """Return the pattern of turning points that readings follow; empty for a sampled motion."""
-    if theta.size < FEWEST_PEAKS:
-        return ""
-    steps, size = np.diff(time), np.abs(theta)
-    slowly = np.abs(np.diff(steps)) < PERIOD_CHANGE * np.minimum(steps[1:], steps[:-1])
-    falls = np.diff(size) < PEAK_RISE * float(size.max())
-    regular = min(np.mean(slowly), np.mean(falls)) >= KEEP_PATTERN
-    if not regular or size[-1] > (1 - PEAK_RISE) * size[0]:
-        return ""
-    other_side = theta[1:] * theta[:-1] < 0
-    if np.mean(other_side) >= KEEP_PATTERN:
-        return "readings on one side and the other"
-    clocked = float(np.ptp(steps)) < CLOCK_SPREAD * float(np.mean(steps))
-    inward = np.mean(np.diff(theta) * np.sign(theta[0]) < 0) >= KEEP_PATTERN
-    return "slow readings on one side" if inward and not clocked and not other_side.any() else ""
 
 
 def turning_points(work: Work) -> Finding | None:
@@ -112,6 +81,17 @@ def derived(work: Work) -> Finding | None:
     return work.finding("angle-integrated")
 
 
+def _accelerated(work: Work) -> Finding:
+    """Compute the angle from an acceleration alone."""
+    reading, sensor = work.extra["acceleration"], _placed(work)
+    work.theta, work.accelerometer = _angle_of_acceleration(work.time, reading, sensor, work.where)
+    place = "an angular acceleration"
+    if sensor.direction != "angular":
+        removed = f"g = {sensor.gravity:g} m/s^2" if sensor.gravity else "gravity removed"
+        place = f"a tangential acceleration {sensor.distance_m:g} m from the pivot, {removed}"
+    return work.finding("angle-from-acceleration", place=place)
+
+
 def _placed(work: Work) -> Accelerometer:
     """Return the accelerometer of a record; InputError if no angle follows from it alone."""
     sensor = work.accelerometer
@@ -135,16 +115,56 @@ def _placed(work: Work) -> Accelerometer:
     )
 
 
-def _accelerated(work: Work) -> Finding:
-    """Compute the angle from an acceleration alone."""
-    sensor = _placed(work)
-    doubt = angle_from(work, sensor)
-    place = "an angular acceleration"
-    if sensor.direction != "angular":
-        removed = f"g = {sensor.gravity:g} m/s^2" if sensor.gravity else "gravity removed"
-        place = f"a tangential acceleration {sensor.distance_m:g} m from the pivot, {removed}"
-    work.doubt = work.finding("acceleration-weak", doubt=doubt) if doubt else None
-    return work.finding("angle-from-acceleration", place=place)
+def _angle_of_acceleration(
+    time: Floats, reading: Floats, sensor: Accelerometer, where: str
+) -> tuple[Floats, Accelerometer]:
+    """Return the angle of an acceleration alone, right below a quarter turn, and its sensor.
+
+    Raises InputError if the readings are not those of free swings.
+    """
+    from scipy.special import ellipk
+
+    least = max(LEAST_SWING * np.nan_to_num(noise_of(time, reading).sigma), 1e-12)
+    middle = float(np.median(reading))
+    for _ in range(3):
+        half = swings(time, reading - middle, least=least)
+        if half.peak.size < FEWEST_PEAKS:
+            raise InputError(
+                f"{where}: the acceleration must show {FEWEST_PEAKS} half swings or more if there"
+                f" is no angle, got {half.peak.size}"
+            )
+        middle += float(np.median(half.middle))
+    values, size = reading - middle, np.abs(half.peak[1:-1])
+    blind = size.max() < 2 * least and sensor.gravity
+    low, high = np.quantile(reading, (0.02, 0.98)).tolist()
+    sided = low * high > 0 or min(abs(low), abs(high)) < ONE_SIDED * max(abs(low), abs(high))
+    if sided and sensor.direction != "angular":
+        raise InputError(
+            f'{where}: direction is "tangential", but the readings lie on one side, {low:.3g} to'
+            f" {high:.3g} m/s^2, as those along the rod: it must be the column of the axis across"
+            " the rod"
+        )
+    smaller = np.argsort(size)[: max(size.size // 3, 3)]
+    w0 = 2 * math.pi / float(np.median(half.period[smaller]))
+    for _ in range(20):
+        share = np.minimum(size / max(abs(dataclasses.replace(sensor, w0=w0).gain), 1e-9), 1.0)
+        grown = 2 / math.pi * ellipk(np.sin(np.arcsin(share) / 2) ** 2)
+        w0 = (w0 + 2 * math.pi * float(np.median((grown / half.period)[smaller]))) / 2
+    sensor = dataclasses.replace(sensor, w0=w0)
+    if blind or abs(sensor.distance_m * w0**2 / (sensor.gravity or math.inf) - 1) < BLIND_SPOT:
+        raise InputError(
+            f"{where}: distance_m is {sensor.distance_m:g}, and the readings are hardly more than"
+            " noise, as at the centre of oscillation, g/w0^2 from the pivot, where gravity and the"
+            " swing cancel: only damping is measured there; it must be another place on the rod, or"
+            " an angle must be recorded too"
+        )
+    most, top = abs(sensor.gain), float(np.quantile(size, 0.8))
+    if top > LARGEST_READING * most:
+        raise InputError(
+            f"{where}: the acceleration reaches {top:.3g} {sensor.unit}, and a swing of this period"
+            f" at most {most:.3g}: unit, distance_m, direction or gravity_removed is wrong"
+        )
+    return np.arcsin(np.clip(values / sensor.gain, -1, 1)), sensor
 
 
 def _circle_angle(work: Work, x: Floats, y: Floats) -> Finding:
@@ -160,11 +180,18 @@ def _circle_angle(work: Work, x: Floats, y: Floats) -> Finding:
     a, b = float(solution[0]) / 2, float(solution[1]) / 2
     radius = math.sqrt(max(float(solution[2]) + a * a + b * b, 1e-12))
     near = np.ones(u.size, bool)
+    from scipy.optimize import least_squares
+
     for _ in range(2):
-        a, b, radius, error, rms = _geometric(u[near], v[near], a, b, radius)
-        away = np.abs(np.hypot(u - a, v - b) - radius)
-        limit = 6 * max(normal_scale(away), 1e-9)
-        near = away <= limit
+        inside = u[near], v[near]
+        fit = least_squares(
+            _distances, (a, b, radius), args=inside, method="lm", xtol=1e-14, ftol=1e-14
+        )
+        a, b, radius = fit.x.tolist()
+        rms = math.sqrt(2 * fit.cost / near.sum())
+        error = rms * math.sqrt(float(np.linalg.pinv(fit.jac.T @ fit.jac)[2, 2]))
+        away = np.abs(_distances(fit.x, u, v))
+        near = away <= 6 * max(normal_scale(away), 1e-9)
     if not (math.isfinite(radius) and 0 < radius < 1e3):
         raise InputError(
             f"{work.where}: pixel_x and pixel_y must be positions of a bob on a circle,"
@@ -176,47 +203,27 @@ def _circle_angle(work: Work, x: Floats, y: Floats) -> Finding:
     work.theta = np.unwrap(np.arctan2(u - a, down * (v - b)))
     centre = middle + size * np.array([a, b])
     if error > RADIUS_DOUBT * radius:
-        work.doubt = work.finding("circle-uncertain", percent=100 * error / radius)
+        work.note("circle-uncertain", percent=100 * error / radius)
     way, radius, rms = "down" if down > 0 else "up", radius * size, rms * size
     x0, y0 = centre
     return work.finding("angle-from-pixels", x=x0, y=y0, radius=radius, way=way, rms=rms)
 
 
-def _geometric(
-    u: Floats, v: Floats, a: float, b: float, radius: float
-) -> tuple[float, float, float, float, float]:
-    """Return the circle of least squared distances, its radius' standard error, and the rms."""
-    for _ in range(GAUSS_NEWTON_STEPS):
-        distance = np.maximum(np.hypot(u - a, v - b), 1e-12)
-        slope = np.column_stack([-(u - a) / distance, -(v - b) / distance, -np.ones(u.size)])
-        step = np.linalg.lstsq(slope, -(distance - radius), rcond=None)[0]
-        a, b, radius = a + float(step[0]), b + float(step[1]), radius + float(step[2])
-        if not math.isfinite(radius) or np.max(np.abs(step)) < 1e-12:
-            break
-    distance = np.hypot(u - a, v - b) - radius
-    rms = float(np.sqrt(np.mean(distance**2)))
-    inverse = np.linalg.pinv(slope.T @ slope)
-    error = rms * math.sqrt(max(float(inverse[2, 2]), 0.0))
-    return a, b, radius, error, rms
+def _distances(circle: Floats, u: Floats, v: Floats) -> Floats:
+    """Return the distances of points from a circle (centre and radius), positive outside."""
+    return np.asarray(np.hypot(u - circle[0], v - circle[1]) - circle[2])
 
 
 def missing(work: Work) -> Finding | None:
-    """Remove rows without an angle."""
-    return _finite(work, "angle", work.theta)
-
-
-def huge(work: Work) -> Finding | None:
-    """Remove implausible angles; InputError if most are."""
-    which = np.abs(work.theta) > LARGEST_ANGLE
-    if np.mean(which) > MOST_HUGE:
-        largest = float(np.max(np.abs(work.theta)))
+    """Remove rows without a possible angle; InputError if most are too large."""
+    huge = np.abs(work.theta) > LARGEST_ANGLE
+    if np.mean(huge) > MOST_HUGE:
+        largest = float(np.nanmax(np.abs(work.theta)))
         raise InputError(
             f"{work.where}: angles must be up to {LARGEST_ANGLE:g} rad, got {largest:.3g} rad, too"
             " large for a pendulum; a scale can be given in [columns] of experiment.toml"
         )
-    finding = work.leave_out(which, "angle-huge", "number", largest=LARGEST_ANGLE)
-    work.refuse_short()
-    return finding
+    return _finite(work, "angle", np.where(huge, math.nan, work.theta))
 
 
 def wrapped(work: Work) -> Finding | None:
@@ -229,5 +236,5 @@ def wrapped(work: Work) -> Finding | None:
     work.theta = np.unwrap(work.theta)
     fastest = float(np.quantile(np.abs(np.diff(work.theta)), 0.999))
     if fastest > math.pi / 2:
-        work.doubt = work.finding("unwrapping-uncertain", step=fastest)
+        work.note("unwrapping-uncertain", step=fastest)
     return work.finding("angle-wrapped", at=jumps + 1, jumps=counted(jumps.size, "jump"))

@@ -11,7 +11,7 @@ import numpy as np
 from pendmap.errors import InputError, short_repr
 from pendmap.model.quantities import GRAVITY
 from pendmap.records.description import Column
-from pendmap.records.findings import finding_of
+from pendmap.records.experiment import finding_of
 from pendmap.records.rod_sensors import accelerometer_of
 from pendmap.records.units import CHANNELS, PIVOT_UNITS, name_and_unit, plain, spelling
 from pendmap.records.work import Work
@@ -77,7 +77,9 @@ def channels_of(  # noqa: C901 (a step each)
         values[channel] = _in_si(channel, raw, head, column, counts, f"{where}: {channel}")
         heads[channel] = head_of(table, place)
     pivot, pivot_unit, carried = _pivot(table, plan, where)
-    if plan.pivot and "unit" not in plan.pivot:
+    if plan.kind == "forced" and not (plan.drive or plan.pivot):
+        findings.append(finding_of("drive-missing"))
+    if plan.pivot and plan.pivot.unit is None:
         findings.append(finding_of("pivot-unit.missing"))
     unused, questions = _unused(table, {*places.values(), *carried}, places, plan)
     findings += questions
@@ -86,7 +88,6 @@ def channels_of(  # noqa: C901 (a step each)
         head = table.names[places["acceleration"]]
         gravity = float(known.get("gravity", GRAVITY))
         sensor, missing = accelerometer_of(asked.get("acceleration", Column()), head, gravity)
-    edges = asked.get("trigger", Column())
     time = values.pop("time")
     return Work(
         where=where,
@@ -104,8 +105,7 @@ def channels_of(  # noqa: C901 (a step each)
         unused=unused,
         accelerometer=sensor,
         place_missing=missing,
-        edge=edges.edge,
-        phase=edges.phase,
+        edge=asked.get("trigger", Column()).edge,
         pivot_unit=pivot_unit,
     )
 
@@ -182,14 +182,11 @@ def _pivot(
     """Return the pivot's channels in SI, their unit, and the indices of their columns."""
     if plan.pivot is None:
         return {}, None, []
-    unit, factor = PIVOT_UNITS[plan.pivot.get("unit", "m/s2")]
-    places = {
-        way: _place(plan.pivot[way], table, f"{where}: pivot: {way}")
-        for way in ("vertical", "horizontal")
-        if way in plan.pivot
-    }
-    scale = plan.pivot_scale
-    motion = {way: table.values[:, place] * factor * scale for way, place in places.items()}
+    unit, factor = PIVOT_UNITS[plan.pivot.unit or "m/s2"]
+    factor *= plan.pivot.scale * plan.pivot.sign
+    names = {"vertical": plan.pivot.vertical, "horizontal": plan.pivot.horizontal}
+    places = {k: _place(v, table, f"{where}: pivot: {k}") for k, v in names.items() if v}
+    motion = {way: table.values[:, place] * factor for way, place in places.items()}
     return motion, unit, list(places.values())
 
 
@@ -266,7 +263,6 @@ def _by_position(table: Table, places: dict[str, int], *, timed: bool) -> list[F
         free = [k for k in free if np.any(np.diff(table.values[:, k]) != 1)]
     if "time" not in places and free:
         k = next((k for k in free if _rises(table.values[:, k])), None)
-        k = free[0] if k is None and timed and _orders(table.values[:, free[0]]) else k
         if k is not None:
             places["time"] = k
             free.remove(k)
@@ -276,13 +272,6 @@ def _by_position(table: Table, places: dict[str, int], *, timed: bool) -> list[F
         guesses.append(f"column {free[0] + 1} is the angle")
     finding = finding_of("columns-guessed.places", names=", ".join(guesses))
     return [finding] if guesses else []
-
-
-def _orders(values: Floats) -> bool:
-    """Return whether values may be times out of order: evenly spaced once sorted."""
-    steps = np.diff(np.sort(values[np.isfinite(values)]))
-    usual = float(np.median(steps)) if steps.size else 0.0
-    return usual > 0 and bool(np.mean(np.abs(steps - usual) < 0.5 * usual) > 0.5)
 
 
 def _rises(values: Floats) -> bool:

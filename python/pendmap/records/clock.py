@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-from bisect import bisect_left
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -29,8 +28,6 @@ MOST_UNORDERED: Final = 0.3  # Share of unordered stamps above which the record 
 STOPPED_READINGS: Final = 50  # Most readings with one stamp (or ten times the usual number)
 COARSE_STAMPS: Final = 0.2  # Least share of repeated stamps of a coarse clock
 SPACING: Final = frozenset(("time-gap", "time-jitter", "time-uneven"))  # Findings about intervals
-# Overflow times of 16- and 32-bit counters in us, ms or s, in seconds
-COUNTER_WRAPS: Final = tuple(2.0**bits * unit for bits in (16, 32) for unit in (1e-6, 1e-3, 1.0))
 AROUND: Final = 101  # Readings around one whose second differences are usual there
 EXACT: Final = 1e-6  # Share of a tick below which a distance is rounding
 
@@ -63,18 +60,6 @@ def stopped(work: Work) -> Finding | None:
     finding = work.finding("time-stops", at=begin, times=times, readings=readings)
     work.keep(np.delete(np.arange(work.time.size), out))
     return finding
-
-
-def wrapped(work: Work) -> Finding | None:
-    """Unwrap a clock counter that overflowed."""
-    steps = np.diff(work.time)
-    usual = float(np.median(np.abs(steps)))
-    for wrap in COUNTER_WRAPS:
-        at = np.flatnonzero(np.abs(steps + wrap) < max(20 * usual, 1e-9))
-        if at.size and wrap > 100 * usual and np.all(steps[at] < 0):
-            work.time[1:] += wrap * np.cumsum(np.isin(np.arange(steps.size), at))
-            return work.finding("time-wrapped", at=at + 1, wraps=counted(at.size, "time"))
-    return None
 
 
 def restarted(work: Work) -> Finding | None:
@@ -113,24 +98,21 @@ def longest_between(edges: list[int], size: int) -> Stretch:
 
 def edge_stamps(work: Work) -> Finding | None:
     """Spread the equal stamps of a log of an encoder's edges over the clock's tick."""
-    if not _even_if_coarse(work) or not logs_edges(work.theta):
-        return None
     same = float(np.mean(np.diff(work.time) == 0))
-    if not same:
+    if not same or not _increasing(work.time) or not logs_edges(work.theta):
         return None
     work.time = spread_stamps(work.time)
     return work.finding("time-coarse.edges", percent=100 * same)
 
 
-def _even_if_coarse(work: Work) -> bool:
-    """Return whether the stamps increase, and thus may be those of a coarse clock."""
-    steps = np.diff(work.time)
-    return steps.size > 0 and bool(np.all(steps >= 0) and np.any(steps > 0))
+def _increasing(time: Floats) -> bool:
+    """Return whether stamps increase, some of them equal, as those of a coarse clock."""
+    return bool(np.all(np.diff(time) >= 0) and time[-1] > time[0])
 
 
 def coarse(work: Work) -> Finding | None:
     """Space readings evenly if stamps are in coarse ticks: over the record, else over a tick."""
-    if not _even_if_coarse(work) or logs_edges(work.theta):
+    if not _increasing(work.time) or logs_edges(work.theta):
         return None
     steps = np.diff(work.time)
     same = float(np.mean(steps == 0))
@@ -232,14 +214,6 @@ def _even(time: Floats, place: Indices, tick: float) -> _Even:
     return _Even(usual + slope, spread, times, missed)
 
 
-def backwards(work: Work) -> Finding | None:
-    """Reverse rows that run backwards in time."""
-    if not np.all(np.diff(work.time) < -_rounding(work.time)):
-        return None
-    work.keep(np.arange(work.time.size)[::-1])
-    return work.finding("time-backwards.reversed")
-
-
 def repeated(work: Work) -> Finding | None:
     """Remove rows with the time of the row before."""
     again = np.append(False, np.abs(np.diff(work.time)) <= _rounding(work.time))
@@ -248,26 +222,28 @@ def repeated(work: Work) -> Finding | None:
 
 
 def unordered(work: Work) -> Finding | None:
-    """Sort rows out of order, if the angle is then smooth, or remove the fewest."""
+    """Sort rows out of order, if the angle is then smooth, or remove them."""
     if np.all(np.diff(work.time) > 0):
         return None
-    rising = _longest_rising(work.time)
-    out = np.setdiff1d(np.arange(work.time.size), rising)
+    from scipy.ndimage import median_filter
+
+    around = median_filter(work.time, 5, mode="nearest")
+    false = np.abs(work.time - around) > 5 * np.median(np.abs(np.diff(work.time)))
+    highest = np.maximum.accumulate(np.where(false, -np.inf, work.time))
+    false |= np.append(False, work.time[1:] <= highest[:-1])
     order = np.argsort(work.time, kind="stable")
-    if _smoother(work.theta[order], np.flatnonzero(np.isin(order, out))):
-        key, number = "time-backwards.sorted", counted(out.size, "row")
-        rising = order
-    elif out.size > MOST_UNORDERED * work.time.size:
+    if _smoother(work.theta[order], np.flatnonzero(false[order])):
+        at = np.flatnonzero(false)
+        finding = work.finding("time-backwards.sorted", at=at, number=counted(at.size, "row"))
+        work.keep(order)
+        work.keep(np.append(True, np.diff(work.time) > _rounding(work.time)))
+        return finding
+    if np.mean(false) > MOST_UNORDERED:
         raise InputError(
-            f"{work.where}: the times must be in order, {out.size} of {work.time.size} are out"
+            f"{work.where}: the times must be in order, {np.sum(false)} of {false.size} are out"
             " of order, and sorted by time the angles are no smooth motion"
         )
-    else:
-        key, number = "time-backwards.left-out", counted(out.size, "time stamp")
-    finding = work.finding(key, at=out, number=number)
-    work.keep(rising)
-    work.keep(np.append(True, np.diff(work.time) > _rounding(work.time)))
-    return finding
+    return work.leave_out(false, "time-backwards.left-out", "time stamp")
 
 
 def _rounding(time: Floats) -> float:
@@ -289,35 +265,18 @@ def _smoother(theta: Floats, at: Indices) -> bool:
     return bool(np.all(bend[place] <= 3 * percentile_filter(bend, 90, size=AROUND)[place]))
 
 
-def _longest_rising(time: Floats) -> Indices:
-    """Return the indices of the longest strictly increasing subsequence."""
-    tails: list[float] = []
-    ends: list[int] = []
-    before = np.full(time.size, -1, np.intp)
-    for k, value in enumerate(time.tolist()):
-        at = bisect_left(tails, value)
-        before[k] = ends[at - 1] if at else -1
-        if at == len(tails):
-            tails.append(value)
-            ends.append(k)
-        else:
-            tails[at] = value
-            ends[at] = k
-    place, chain = ends[-1], []
-    while place >= 0:
-        chain.append(place)
-        place = int(before[place])
-    return np.asarray(chain[::-1], np.intp)
-
-
 def gaps(work: Work) -> Finding | None:
-    """Report gaps and uneven intervals; InputError for times that do not increase."""
+    """Report gaps, and uneven or jittering intervals; InputError for times that do not increase."""
     if work.time.size < 2 or not work.time[-1] > work.time[0]:
         raise InputError(f"{work.where}: the times must be in order, they do not increase")
     steps, intervals = np.diff(work.time), intervals_of(work.time)
-    at = intervals.gaps
+    usual, at = intervals.tick, intervals.gaps
     if at.size > steps.size / 4:
         return work.finding("time-uneven", low=steps.min(), high=steps.max())
+    spread = math.sqrt(float(np.mean((np.delete(steps, at) - usual) ** 2)))
+    if spread > REPORTED_JITTER * usual:
+        percent = 100 * spread / usual
+        work.note("time-jitter", spread=spread, percent=percent, interval=usual)
     if not at.size:
         return None
     worst = at[int(np.argmax(steps[at]))]
@@ -333,17 +292,6 @@ def gaps(work: Work) -> Finding | None:
     )
 
 
-def jitter(work: Work) -> Finding | None:
-    """Report intervals that scatter."""
-    steps, intervals = np.diff(work.time), intervals_of(work.time)
-    usual, at = intervals.tick, intervals.gaps
-    spread = math.sqrt(float(np.mean((np.delete(steps, at) - usual) ** 2)))
-    if at.size > steps.size / 4 or spread <= REPORTED_JITTER * usual:
-        return None
-    percent = 100 * spread / usual
-    return work.finding("time-jitter", spread=spread, percent=percent, interval=usual)
-
-
 def no_clock(work: Work) -> None:
     """Drop findings about intervals that are those of turning points or encoder edges."""
     if work.peaks_only or work.edges:
@@ -353,10 +301,9 @@ def no_clock(work: Work) -> None:
 def cut(work: Work) -> None:
     """Keep the samples between ``from_s`` and ``to_s`` of the description."""
     low, high = work.plan.from_s, work.plan.to_s
-    if low is None and high is None:
-        return
     first, last = float(work.time[0]), float(work.time[-1])
-    low, high = -math.inf if low is None else low, math.inf if high is None else high
+    if low <= first and last <= high:
+        return
     work.keep((work.time >= low) & (work.time <= high))
     if work.time.size < FEWEST_SAMPLES:
         raise InputError(
@@ -365,9 +312,8 @@ def cut(work: Work) -> None:
         )
 
 
-def pause(work: Work) -> Finding | None:
+def pause(work: Work) -> None:
     """Keep the larger side, by samples, of each pause longer than the rest of the record."""
-    finding = None
     while work.time.size > 2:
         steps = np.diff(work.time)
         at = int(np.argmax(steps)) + 1
@@ -375,10 +321,6 @@ def pause(work: Work) -> Finding | None:
         rest = float(work.time[-1] - work.time[0] - longest)
         if longest <= max(rest, RESTART * float(np.median(steps))):
             break
-        places = np.arange(work.time.size)
         side = "before" if at >= work.time.size - at else "after"
-        if finding is not None:
-            work.findings.append(finding)
-        finding = work.finding("time-pause", at=np.array([at]), pause=longest, side=side)
-        work.keep(places < at if side == "before" else places >= at)
-    return finding
+        work.note("time-pause", at=np.array([at]), pause=longest, side=side)
+        work.keep(np.arange(at) if side == "before" else np.arange(at, work.time.size))

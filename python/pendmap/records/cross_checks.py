@@ -6,7 +6,6 @@ acceleration (1000 m/s^2 for 1 mm at 1 kHz): stepwise positions are smoothed by 
 
 from __future__ import annotations
 
-import functools
 import math
 from typing import TYPE_CHECKING, Final
 
@@ -18,8 +17,6 @@ from pendmap.signal.local_polynomial import local_fit
 from pendmap.signal.robust import even_times
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from pendmap.records.experiment import Finding
     from pendmap.records.work import Work
     from pendmap.signal import Floats
@@ -27,9 +24,7 @@ if TYPE_CHECKING:
 
 SAME_MOTION: Final = 0.8  # Least correlation of two channels of the same motion
 GAIN_OFF: Final = 0.1  # Greatest relative error of a gain that a channel's filter may cause
-CERTAIN_SIGN: Final = 8.0  # Standard errors above which a coefficient has the wrong sign
 FARTHEST_PIVOT: Final = {"m": 3.0, "m/s": 60.0, "m/s2": 3000.0}  # Greatest plausible span by unit
-DERIVATIVE_SPAN: Final = 0.12  # Window of the polynomials that give derivatives, periods
 PIVOT_ORDER: Final = {"m": 2, "m/s": 1}  # Order of differentiation to an acceleration, by unit
 NOISE_SHARE: Final = 0.05  # Greatest noise of the pivot's acceleration, over its largest value
 STEPS_PASSED: Final = 4.0  # Fewest resolution steps that a moving pivot passes within a window
@@ -59,9 +54,9 @@ def velocity(work: Work) -> Finding | None:
     gain = abs(float(np.dot(slope, seen) / np.dot(slope, slope)) * scale)
     if abs(gain * math.pi / 180 - 1) < GAIN_OFF and "velocity" not in work.declared:
         work.extra["velocity"] = values * math.pi / 180
-        work.doubt = work.finding("velocity-unit", gain=gain)
+        work.note("velocity-unit", gain=gain)
     elif abs(gain - 1) > GAIN_OFF:
-        work.doubt = work.finding("velocity-scale", gain=gain)
+        work.note("velocity-scale", gain=gain)
     if alike > 0:
         return None
     work.extra["velocity"] = -work.extra["velocity"]
@@ -75,60 +70,6 @@ def pivot_unit(work: Work) -> Finding | None:
         if work.pivot_unit and span > FARTHEST_PIVOT[work.pivot_unit]:
             return work.finding("pivot-unit.wrong", way=way, extent=span, unit=work.pivot_unit)
     return None
-
-
-def drive_sign(work: Work) -> Finding | None:
-    """Report a drive or pivot whose coefficient the angle shows with the wrong sign."""
-    from scipy.signal import savgol_filter
-
-    interval, even = even_times(work.time)
-    count, good = even.size, work.trusted
-    if count < 100 or not good.any():
-        return None
-    theta = np.interp(even, work.time[good], work.theta[good])
-    w0 = work.known.get("w0") or 6.0
-    window = max(round(DERIVATIVE_SPAN * 2 * math.pi / w0 / interval), 5) | 1
-    if window > count // 4:
-        return None
-
-    smooth = functools.partial(savgol_filter, window_length=window, polyorder=3, delta=interval)
-    pushes = _pushes(work, even, smooth)
-    arms = {name: np.cos if name == "horizontal" else np.sin for name in pushes}
-    columns = [smooth(push * arms[name](theta)) for name, push in pushes.items()]
-    table = np.column_stack([smooth(np.sin(theta)), *columns])
-    if not pushes or np.linalg.matrix_rank(table) < table.shape[1]:
-        return None
-    target = smooth(theta, deriv=2)
-    answer = np.linalg.lstsq(table, target, rcond=None)[0]
-    rest = target - table @ answer
-    worth = max(count / window, table.shape[1] + 1.0)
-    variance = float(np.sum(rest**2)) / count * (count / worth)
-    errors = np.sqrt(np.maximum(np.diag(np.linalg.pinv(table.T @ table)) * variance, 1e-300))
-    if answer[0] > 0:
-        return None  # no oscillation about theta = 0: the sign is undetermined
-    for name, value, error in zip(pushes, answer[1:], errors[1:], strict=True):
-        if value > CERTAIN_SIGN * error:
-            key = "sign-turned.drive" if name == "drive" else "sign-turned.pivot"
-            return work.finding(key, way=name)
-    return None
-
-
-def _pushes(work: Work, even: Floats, smooth: Callable[..., Floats]) -> dict[str, Floats]:
-    """Return the accelerations of the pivot, or a(t) of the drive, at equally spaced times."""
-    pushes: dict[str, Floats] = {}
-    drive = work.plan.drive or {}
-    p, phi = drive.get("p"), drive.get("phi")
-    if p and phi is not None:
-        pushes["drive"] = p * np.cos((drive["Omega"] or 0.0) * even + phi)
-    order = PIVOT_ORDER.get(work.pivot_unit or "", 0)
-    for way, values in work.pivot.items():
-        good = np.isfinite(values)
-        if np.count_nonzero(good) < even.size // 2 or np.std(values[good]) == 0:
-            continue
-        if np.max(np.abs(values[good])) < 1e6:
-            motion = np.interp(even, work.time[good], values[good])
-            pushes[way] = smooth(motion, deriv=order) if order else motion
-    return pushes
 
 
 def acceleration(work: Work) -> Finding | None:

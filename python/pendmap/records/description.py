@@ -1,10 +1,14 @@
-"""Description of an experiment, ``experiment.toml``: its fields and their checks."""
+"""Description of an experiment, ``experiment.toml``: its fields and their checks.
+
+Each table of the file is a dataclass, each key one of its fields with a check.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 import difflib
-from typing import TYPE_CHECKING, Any, Final, Literal
+import math
+from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar
 
 from pendmap.errors import (
     InputError,
@@ -19,66 +23,105 @@ from pendmap.files import read_toml
 from pendmap.records.units import ANGULAR_ACCELERATIONS, CHANNELS, PIVOT_UNITS, spelling
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Iterable, Mapping
     from pathlib import Path
 
-    Checks = Mapping[str, Callable[[str, object], Any]]
-
+T = TypeVar("T")
 Kind = Literal["free", "forced"]
 Direction = Literal["tangential", "radial", "angular"]
 
 NAME: Final = "experiment.toml"
 RATE: Final = "rate_hz"
-_DRIVE_LIKE: Final = "drive = { p = 0.2, Omega = 12.1 }"
-# Names of dimensional quantities of a drive, which are refused with advice
-_MEASURED_DRIVE: Final = (
-    *("stroke_mm", "stroke_m", "stroke", "amplitude_mm", "amplitude_m", "amplitude", "Y"),
-    *("frequency_hz", "frequency", "f_hz", "f"),
-)
-_PIVOT_LIKE: Final = 'pivot = { vertical = "acc_y", unit = "m/s2" }'
-_MOST_SKIPPED: Final = 1_000_000
-_MOST_COUNTS: Final = 10**9
-_LARGEST: Final = 1e12  # Greatest magnitude of a number in a description
-_FARTHEST: Final = 100.0  # Greatest distance of a sensor from the pivot, m
+LARGEST: Final = 1e12  # Greatest magnitude of a number in a description
+NUMBER: Final = (-LARGEST, LARGEST)
+POSITIVE: Final = (1 / LARGEST, LARGEST)
+
+
+def _key(rule: object, default: Any = None) -> Any:  # noqa: ANN401 (of any type)
+    """Return a field whose value in the file follows a rule of :func:`_checked`."""
+    return dataclasses.field(default=default, metadata={"rule": rule})
+
+
+@dataclasses.dataclass(frozen=True)
+class Rig:
+    """``[rig]``: what is known of the rig."""
+
+    gravity: float | None = _key(POSITIVE)
+    length_m: float | None = _key(POSITIVE)
+    w0: float | None = _key(POSITIVE)
+    encoder_counts: int | None = _key(range(1, 10**9))
 
 
 @dataclasses.dataclass(frozen=True)
 class Column:
-    """Column of a channel; position of an accelerometer, edge and phase of a trigger."""
+    """Column of a channel; position of an accelerometer, edge of a trigger."""
 
-    name: str | None = None
-    unit: str | None = None
-    scale: float | None = None  # SI unit per unit of the column
-    zero: float = 0.0  # in the unit of the column
-    direction: Direction | None = None
-    distance_m: float | None = None
-    gravity_removed: bool | None = None
-    edge: str | None = None
-    phase: float | None = None  # of the drive at the edge, rad
+    name: str | None = _key(str)
+    unit: str | None = _key(str)
+    scale: float | None = _key(NUMBER)  # SI unit per unit of the column
+    zero: float = _key(NUMBER, 0.0)  # in the unit of the column
+    direction: Direction | None = _key(["tangential", "radial", "angular"])  # noqa: RUF009
+    distance_m: float | None = _key((1e-6, 100.0))  # from the pivot
+    gravity_removed: bool | None = _key(bool)
+    edge: str | None = _key(["rising", "falling"])
+
+
+# Channels of the keys of a column that one channel has alone
+ONLY_OF: Final = {
+    **dict.fromkeys(("direction", "distance_m", "gravity_removed"), "acceleration"),
+    "edge": "trigger",
+}
 
 
 @dataclasses.dataclass(frozen=True)
 class Reader:
     """Format of the files, as far as it cannot be inferred from them."""
 
-    delimiter: str | None = None
-    decimal: str | None = None
-    skip_rows: int = 0
+    delimiter: str | None = _key(str)
+    decimal: str | None = _key([".", ","])
+    skip_rows: int = _key(range(1_000_000), 0)
+
+
+@dataclasses.dataclass(frozen=True)
+class Drive:
+    """Drive ``a(t) = p cos(Omega t + phi)``; a ``phi`` of None is fitted."""
+
+    p: float = _key(NUMBER, dataclasses.MISSING)
+    Omega: float = _key(POSITIVE, dataclasses.MISSING)
+    phi: float | None = _key(NUMBER)
+
+
+@dataclasses.dataclass(frozen=True)
+class Pivot:
+    """Columns of the pivot's motion, their unit, and their factor and sign."""
+
+    vertical: str | None = _key(str)
+    horizontal: str | None = _key(str)
+    unit: str | None = _key([*PIVOT_UNITS])
+    scale: float = _key(POSITIVE, 1.0)
+    sign: float = _key([1, -1], 1.0)
+
+
+# What a table is like, for messages
+EXAMPLES: Final[Mapping[type, str]] = {
+    Drive: "drive = { p = 0.2, Omega = 12.1 }, of p = Y Omega^2/g and Omega = 2 pi f",
+    Pivot: 'pivot = { vertical = "acc_y", unit = "m/s2" }',
+    Column: 'angle = { name = "...", unit = "..." }',
+}
 
 
 @dataclasses.dataclass(frozen=True)
 class RunPlan:
-    """Fields of one ``[[run]]``; ``pivot_scale`` is the signed factor from columns to unit."""
+    """Fields of one ``[[run]]``."""
 
-    file: str
-    kind: Kind = "free"
-    lab_time_s: float = 0.0
-    from_s: float | None = None
-    to_s: float | None = None
-    hold_out: bool = False
-    drive: Mapping[str, float | None] | None = None
-    pivot: Mapping[str, str] | None = None
-    pivot_scale: float = 1.0
+    file: str = _key(str, dataclasses.MISSING)
+    kind: Kind = _key(["free", "forced"], "free")  # noqa: RUF009
+    lab_time_s: float = _key(NUMBER, 0.0)
+    from_s: float = _key(NUMBER, -math.inf)
+    to_s: float = _key(NUMBER, math.inf)
+    hold_out: bool = _key(bool, default=False)
+    drive: Drive | None = _key(Drive)  # noqa: RUF009
+    pivot: Pivot | None = _key(Pivot)  # noqa: RUF009
 
 
 @dataclasses.dataclass(frozen=True)
@@ -110,11 +153,13 @@ def _description(content: dict[str, Any]) -> Description:
     plans = tuple(_run(f"[[run]] {count}", table) for count, table in enumerate(runs, 1))
     columns = _table("[columns]", content.get("columns", {}))
     _refuse_unknown(columns, (*CHANNELS, RATE), "[columns]")
+    rig = dataclasses.asdict(_parsed(Rig, "[rig]", content.get("rig", {})))
+    reader = _reader(content.get("reader", {}))
     return Description(
-        _checked("[rig]", content.get("rig", {}), _RIG),
+        {name: value for name, value in rig.items() if value is not None},
         {name: _column(name, value) for name, value in columns.items() if name != RATE},
-        _positive(f"[columns]: {RATE}", columns[RATE]) if RATE in columns else None,
-        _reader(content.get("reader", {})),
+        _checked(f"[columns]: {RATE}", columns[RATE], POSITIVE) if RATE in columns else None,
+        reader,
         plans,
     )
 
@@ -122,200 +167,109 @@ def _description(content: dict[str, Any]) -> Description:
 def _table(where: str, value: object, example: str = "") -> dict[str, Any]:
     """Return a value if it is a table; raise InputError if not."""
     if not isinstance(value, dict):
-        like = f" like {example}" if example else ""
-        raise InputError(f"{where} must be a table{like}, got {short_repr(value)}")
+        raise InputError(f"{where} must be a table{example}, got {short_repr(value)}")
     return value
 
 
 def _refuse_unknown(
-    table: Mapping[str, Any], known: Iterable[str], where: str, among: str = ""
+    table: Iterable[str], known: Iterable[str], where: str, among: str = ""
 ) -> None:
     """Raise InputError for unknown keys, with the nearest known one."""
-    known = list(known)
-    for key in table:
-        if key in known:
-            continue
-        near = difflib.get_close_matches(key.lower(), [k.lower() for k in known], 1, 0.55)
-        meant = next((k for k in known if near and k.lower() == near[0]), None)
-        perhaps = f", perhaps {meant} is meant" if meant else ""
+    by_lower = {key.lower(): key for key in known}
+    for key in set(table) - set(by_lower.values()):
+        near = difflib.get_close_matches(key.lower(), by_lower, 1, 0.55)
+        perhaps = f", perhaps {by_lower[near[0]]} is meant" if near else ""
         place = f"{where}: " if where else ""
-        names = among or ", ".join(known)
+        names = among or ", ".join(by_lower.values())
         raise InputError(
             f"{place}{shown_key(key)} is not known{perhaps}: it must be one of {names}"
         )
 
 
-def _checked(where: str, value: object, checks: Checks, example: str = "") -> dict[str, Any]:
-    """Return the checked values of a table, in which each key has a check."""
+def _parsed(kind: type[T], where: str, value: object, without: Iterable[str] = ()) -> T:
+    """Return a table as a dataclass, each of whose fields has a check."""
+    example = f" like {EXAMPLES[kind]}" if kind in EXAMPLES else ""
     table = _table(where, value, example)
-    _refuse_unknown(table, checks, where)
-    return {key: checks[key](f"{where}: {key}", given) for key, given in table.items()}
+    every = dataclasses.fields(kind)  # type: ignore[arg-type]
+    fields = {field.name: field for field in every if field.name not in without}
+    _refuse_unknown(table, fields, where, ", ".join(fields) + (example and f",{example}"))
+    for name, field in fields.items():
+        if field.default is dataclasses.MISSING and name not in table:
+            raise InputError(f"{where}: {name} must be given{example}")
+    rules = {name: fields[name].metadata["rule"] for name in table}
+    return kind(**{name: _checked(f"{where}: {name}", table[name], rules[name]) for name in table})
 
 
-def _number(name: str, value: object) -> float:
-    number = check_number(name, value)
-    if abs(number) > _LARGEST:
-        raise InputError(f"{name} must be a number up to {_LARGEST:g}, got {number:g}")
+def _checked(name: str, value: object, rule: Any) -> Any:  # noqa: ANN401 (of any type)
+    """Return a value that is of a type, a dataclass, in a range, or one of a list."""
+    if isinstance(rule, type) and dataclasses.is_dataclass(rule):
+        return _parsed(rule, name, value)
+    if rule is bool:
+        return check_flag(name, value)
+    if isinstance(rule, range):
+        return check_whole(name, value, rule[0], rule[-1])
+    if isinstance(rule, list):
+        if isinstance(value, bool) or value not in rule:
+            known = [f'"{one}"' if isinstance(one, str) else str(one) for one in rule]
+            raise InputError(f"{name} must be {' or '.join(known)}, got {short_repr(value)}")
+        return value
+    if rule is str:
+        if not isinstance(value, str) or not value:
+            raise InputError(f"{name} must be a text, got {short_repr(value)}")
+        return value
+    (low, high), number = rule, check_number(name, value)
+    if not low <= number <= high:
+        raise InputError(f"{name} must be {low:g} to {high:g}, got {number:g}")
     return number
 
 
-def _number_that(allowed: Callable[[float], bool], wanted: str) -> Callable[[str, object], float]:
-    """Return a check that a number satisfies a condition."""
-
-    def check(name: str, value: object) -> float:
-        number = _number(name, value)
-        if not allowed(number):
-            raise InputError(f"{name} must be {wanted}, got {number:g}")
-        return number
-
-    return check
-
-
-_positive = _number_that(
-    lambda number: number >= 1 / _LARGEST, f"more than 0, at least {1 / _LARGEST:g}"
-)
-
-
-def _text(name: str, value: object) -> str:
-    if not isinstance(value, str) or not value:
-        raise InputError(f"{name} must be a text, got {short_repr(value)}")
-    return value
-
-
-def _one_of(*texts: str) -> Callable[[str, object], str]:
-    """Return a check that a value is one of some texts."""
-    quoted = [f'"{text}"' for text in texts]
-    known = " or ".join(quoted) if len(texts) < 3 else f"one of {', '.join(quoted)}"
-
-    def check(name: str, value: object) -> str:
-        if value not in texts:
-            raise InputError(f"{name} must be {known}, got {short_repr(value)}")
-        return str(value)
-
-    return check
-
-
-def _delimiter(name: str, value: object) -> str:
-    if not isinstance(value, str) or len(value) != 1:
-        wanted = 'one character, like ";" or "\\t"'
-        raise InputError(f"{name} must be {wanted}, got {short_repr(value)}")
-    if value in '"\r\n\0+-.0123456789eE':
-        raise InputError(f"{name} must be what numbers do not need, got {short_repr(value)}")
-    return value
-
-
-def _drive(where: str, value: object) -> dict[str, float | None]:
-    """Return the checked drive ``p``, ``Omega``, ``phi`` (None: to be fitted)."""
-    for name in _MEASURED_DRIVE:
-        if name in _table(where, value, _DRIVE_LIKE):
-            raise InputError(
-                f"{where}: {name} is not known: it must be given as p = Y Omega^2/g, of the"
-                " pivot's amplitude Y in m (stroke_mm / 1000), and Omega = 2 pi f in rad/s, of f in"
-                " Hz"
-            )
-    numbers = _checked(where, value, {"p": _number, "Omega": _positive, "phi": _number})
-    for name in ("p", "Omega"):
-        if name not in numbers:
-            raise InputError(f"{where}: {name} must be given, like {_DRIVE_LIKE}")
-    return {"phi": None} | numbers
-
-
-def _pivot(where: str, value: object) -> dict[str, Any]:
-    """Return the columns of the pivot and their unit, and the signed factor of the columns."""
-    named = _checked(where, value, _PIVOT, _PIVOT_LIKE)
-    if not {"vertical", "horizontal"} & set(named):
-        raise InputError(f"{where} must name a column, like {_PIVOT_LIKE}, got none")
-    factor = named.pop("scale", 1.0) * named.pop("sign", 1.0)
-    return {"pivot": named, "pivot_scale": factor}
-
-
-_RIG: Final[Checks] = {
-    **dict.fromkeys(("gravity", "length_m", "w0"), _positive),
-    "encoder_counts": lambda name, value: check_whole(name, value, 1, _MOST_COUNTS),
-}
-_COLUMN: Final[Checks] = {
-    "name": _text,
-    "unit": _text,
-    "scale": _number_that(lambda number: number != 0, "any number but 0"),
-    "zero": _number,
-}
-_COLUMNS: Final[Mapping[str, Checks]] = {
-    "acceleration": {
-        "direction": _one_of("tangential", "radial", "angular"),
-        "distance_m": _number_that(
-            lambda number: 0 < number <= _FARTHEST,
-            f"more than 0, up to {_FARTHEST:g}, from the pivot to the sensor in m",
-        ),
-        "gravity_removed": check_flag,
-    },
-    "trigger": {"edge": _one_of("rising", "falling"), "phase": _number},
-}
-_READER: Final[Checks] = {
-    "delimiter": _delimiter,
-    "decimal": _one_of(".", ","),
-    "skip_rows": lambda name, value: check_whole(name, value, 0, _MOST_SKIPPED),
-}
-_RUN: Final[Checks] = {
-    "file": _text,
-    "kind": _one_of("free", "forced"),
-    **dict.fromkeys(("lab_time_s", "from_s", "to_s"), _number),
-    "hold_out": check_flag,
-    "drive": _drive,
-    "pivot": _pivot,
-}
-_PIVOT: Final[Checks] = {
-    **dict.fromkeys(("vertical", "horizontal"), _text),
-    "unit": _one_of(*PIVOT_UNITS),
-    "scale": _positive,
-    "sign": _number_that(lambda number: abs(number) == 1, "1 or -1"),
-}
+def _reader(value: object) -> Reader:
+    """Return the checked ``[reader]``."""
+    reader = _parsed(Reader, "[reader]", value)
+    delimiter = reader.delimiter
+    if delimiter is not None and (len(delimiter) != 1 or delimiter in '"\r\n\0+-.0123456789eE'):
+        raise InputError(
+            "[reader]: delimiter must be one character that numbers do not need, like"
+            f' ";" or "\\t", got {short_repr(delimiter)}'
+        )
+    if delimiter is not None and delimiter == reader.decimal:
+        raise InputError(f"[reader]: delimiter and decimal must be two, got {delimiter!r} for both")
+    return reader
 
 
 def _column(channel: str, value: object) -> Column:
     """Return the checked column of a channel."""
     where = f"[columns]: {channel}"
-    if isinstance(value, str):
-        return Column(name=_text(where, value))
-    example = f'{channel} = {{ name = "...", unit = "..." }}'
-    column = Column(**_checked(where, value, {**_COLUMN, **_COLUMNS.get(channel, {})}, example))
+    value = {"name": value} if isinstance(value, str) else value
+    others = [key for key, only in ONLY_OF.items() if only != channel]
+    column = _parsed(Column, where, value, others)
+    if column.scale == 0:
+        raise InputError(f"{where}: scale must be any number but 0, got 0")
     if column.unit is None or column.scale is not None:
         return column
     angular = spelling(column.unit) in ANGULAR_ACCELERATIONS
-    if angular and column.direction in {"tangential", "radial"}:
+    if column.direction is not None and angular != (column.direction == "angular"):
+        units = "m/s2 or g" if angular else "rad/s2 or deg/s2"
         raise InputError(
-            f"{where}: unit must be m/s2 or g with direction {column.direction!r}, got"
-            f' {column.unit!r}, which needs direction = "angular"'
-        )
-    if column.direction == "angular" and not angular:
-        raise InputError(
-            f"{where}: unit must be rad/s2 or deg/s2 with direction 'angular', got {column.unit!r}"
+            f"{where}: unit must be {units} with direction {column.direction!r}, got"
+            f" {column.unit!r}"
         )
     CHANNELS[channel].factor(column.unit, where)  # refuses unknown units before files are read
     return column
 
 
-def _reader(value: object) -> Reader:
-    """Return the checked ``[reader]``."""
-    reader = Reader(**_checked("[reader]", value, _READER))
-    if reader.delimiter is not None and reader.delimiter == reader.decimal:
-        raise InputError(
-            f"[reader]: delimiter and decimal must be different, got {reader.decimal!r} for both"
-        )
-    return reader
-
-
 def _run(where: str, value: object) -> RunPlan:
     """Return the checked ``[[run]]``."""
-    values = _checked(where, value, _RUN)
-    if "file" not in values:
-        raise InputError(f'{where}: file must be given, like file = "run_00.csv"')
-    drive, pivot = values.get("drive"), values.pop("pivot", {})
-    kind = values.setdefault("kind", "forced" if drive or pivot else "free")
-    if kind == "free" and drive:
-        raise InputError(f'{where}: kind must be "forced" where there is a drive, got "free"')
-    if drive and pivot:
+    plan = _parsed(RunPlan, where, value)
+    if plan.drive and plan.pivot:
         raise InputError(f"{where}: one of drive and pivot must be left out, got both")
-    low, high = values.get("from_s"), values.get("to_s")
-    if low is not None and high is not None and low >= high:
+    if plan.pivot and not (plan.pivot.vertical or plan.pivot.horizontal):
+        raise InputError(f"{where}: pivot must name a column, like {EXAMPLES[Pivot]}, got none")
+    if (plan.drive or plan.pivot) and "kind" not in _table(where, value):
+        plan = dataclasses.replace(plan, kind="forced")
+    if plan.kind == "free" and plan.drive:
+        raise InputError(f'{where}: kind must be "forced" where there is a drive, got "free"')
+    if plan.from_s >= plan.to_s:
+        low, high = plan.from_s, plan.to_s
         raise InputError(f"{where}: from_s must be less than to_s = {high:g}, got {low:g}")
-    return RunPlan(**values, **pivot)
+    return plan

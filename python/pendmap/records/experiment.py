@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
+import tomllib
+from importlib import resources
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.errors import InputError
@@ -16,8 +19,7 @@ if TYPE_CHECKING:
     from pendmap.records.rod_sensors import Accelerometer, Gyroscope
     from pendmap.signal import Floats, Mask
 
-# Findings about runs without samples for fitting
-NOTHING_TO_FIT: Final = frozenset(("no-motion", "peaks-undeclared"))
+NOTHING_TO_FIT: Final = "no-motion"  # Finding about runs without samples for fitting
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,6 +46,23 @@ class Finding:
     where: str = ""
     from_s: float | None = None
     to_s: float | None = None
+
+
+@functools.cache
+def texts() -> dict[str, tuple[str, bool]]:
+    """Return the text of each finding, and whether the record is corrected."""
+    content = resources.files("pendmap.records").joinpath("findings.toml").read_text("utf-8")
+    tables = tomllib.loads(content).items()
+    return {key: (text, kind == "mended") for kind, table in tables for key, text in table.items()}
+
+
+def finding_of(
+    key: str, *, where: str = "", span: tuple[float, float] | None = None, **values: object
+) -> Finding:
+    """Return a finding, with values in the braces of its text, over a span of time in s."""
+    text, mended = texts()[key]
+    low, high = span or (None, None)
+    return Finding(key.partition(".")[0], text.format(**values), mended, where, low, high)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -218,7 +237,7 @@ class Experiment:
         if any(run.moves for run in runs):
             return
         pairs = self.findings_of(runs)
-        whys = (finding.text for _, finding in pairs if finding.what in NOTHING_TO_FIT)
+        whys = (finding.text for _, finding in pairs if finding.what == NOTHING_TO_FIT)
         why = next(whys, "no sample is trusted")
         raise InputError(f"{self.path}: must be a record of a motion, got nothing to fit: {why}")
 

@@ -11,20 +11,20 @@ import numpy as np
 from pendmap.errors import InputError
 from pendmap.formatting import counted, listed, moment
 from pendmap.records.experiment import Segment
-from pendmap.records.from_acceleration import STILL_SPAN, constant, release_after_hold, swinging
-from pendmap.records.noise import noise_of
-from pendmap.records.periods import middle_of, periods_of
-from pendmap.records.releases import enough, grown, held_short, releases
+from pendmap.records.releases import enough, releases
 from pendmap.records.rod_sensors import gyroscope_of
+from pendmap.records.scale import middle_of, periods_of
 from pendmap.signal.half_cycles import after_turns, swings
 from pendmap.signal.local_polynomial import local_fit
-from pendmap.signal.robust import between, normal_scale, stretches
+from pendmap.signal.robust import between, normal_scale, stretches, widened
 
 if TYPE_CHECKING:
     from pendmap.records.experiment import Finding
     from pendmap.records.work import Work
     from pendmap.signal import Stretch
 
+STILL_SPAN: Final = 8.0  # Range of readings below which there is no motion, over the noise
+FOLDED: Final = 0.97  # Reading over the gain, of an accelerometer, near a quarter turn
 NOISE_SPAN: Final = 0.1  # Range, rad, below which readings dominated by noise show no motion
 MOST_LISTED: Final = 6  # Most releases whose times are listed in a message
 CERTAIN_OFFSET: Final = 4.0  # Standard errors above which an offset is reported
@@ -66,7 +66,6 @@ def free_motions(work: Work) -> Finding | None:
     """Find the free motions of a record, and the period of small swings."""
     if not work.free:
         return None
-    # An angle computed from an acceleration is folded: its readings over the gain are used.
     read = _readings(work)
     good = read.theta[read.trusted]
     middle = middle_of(read.time[read.trusted], good)
@@ -74,17 +73,27 @@ def free_motions(work: Work) -> Finding | None:
     period = _period(work, read.middle)
     if period is None:
         return work.finding("no-swing")
-    work.period, work.middle = period, read.middle
+    work.middle, work.period, read.period = read.middle, period, period
     span = _trusted_span(work)
-    if work.angle_source is not None:
-        work.parts = _free_swings(read, span)
-        return None
-    parts = [(a, b) for a, b in between(_still(work, span), *span) if b - a > 5]
-    work.parts = releases(work, parts)
-    begin = held_short(work, work.parts[0]) if work.parts else None
-    if begin is not None:
-        work.parts[0] = (begin, work.parts[0][1])
-    return None
+    parts = [(a, b) for a, b in between(_still(read, span), *span) if b - a > 5]
+    work.parts = releases(read, parts)
+    return _folded_parts(work, read) if work.angle_source is not None else None
+
+
+def _folded_parts(work: Work, read: Work) -> Finding | None:
+    """Begin each motion where an acceleration shows swings below a quarter turn."""
+    begins = []
+    for low, high in work.parts:
+        time, theta = read.time[low:high], read.theta[low:high] - read.middle
+        crossing = swings(time, theta, least=read.limit).crossing
+        folded = time[np.abs(theta) > FOLDED]
+        after = crossing[crossing > folded[-1]] if folded.size else crossing[:0]
+        begins.append(int(np.searchsorted(work.time, after[0])) if after.size else low)
+    late = [begin for (low, _), begin in zip(work.parts, begins, strict=True) if begin > low]
+    ends = [high for _, high in work.parts]
+    work.parts = [(a, b) for a, b in zip(begins, ends, strict=True) if b - a > 5]
+    times = listed([moment(work.time[k]) for k in late], MOST_LISTED)
+    return work.finding("acceleration-folded", times=times) if late else None
 
 
 def _trusted_span(work: Work) -> Stretch:
@@ -107,22 +116,6 @@ def _readings(work: Work) -> Work:
     return read
 
 
-def _free_swings(read: Work, span: Stretch) -> list[Stretch]:
-    """Return the stretches of free swings in accelerometer readings."""
-    time, readings = read.time[slice(*span)], read.theta[slice(*span)]
-    noise = noise_of(time, readings).sigma
-    free, _ = swinging(time, readings, noise)
-    pieces = [piece for low, high in free for piece in grown(read, (span[0] + low, span[0] + high))]
-    return [
-        (
-            low
-            + release_after_hold(read.time[low:high], read.theta[low:high] - read.middle, noise),
-            high,
-        )
-        for low, high in pieces
-    ]
-
-
 def _period(work: Work, middle: float) -> float | None:
     """Return the approximate period of small swings, s."""
     if work.angle_source is not None:
@@ -139,14 +132,17 @@ def _period(work: Work, middle: float) -> float | None:
 
 def _still(work: Work, span: Stretch) -> list[Stretch]:
     """Return the stretches without motion, a period or longer, within ``span``."""
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
     theta, time = work.theta[slice(*span)].copy(), work.time[slice(*span)]
     bad = ~work.trusted[slice(*span)]
     theta[bad] = np.interp(time[bad], time[~bad], theta[~bad])
     width = max(round(work.period / float(np.median(np.diff(work.time)))), 5) | 1
     if width >= theta.size:
         return []
-    still = stretches(constant(theta, width, work.limit))
-    return [(span[0] + a, span[0] + b) for a, b in still]
+    constant = maximum_filter1d(theta, width) - minimum_filter1d(theta, width) <= work.limit
+    constant[: width // 2] = constant[-(width // 2) :] = False
+    return [(span[0] + a, span[0] + b) for a, b in stretches(widened(constant, width // 2))]
 
 
 def used_motions(work: Work) -> Finding | None:
@@ -212,21 +208,14 @@ def _segment(work: Work, what: str, part: Stretch, *, used: bool) -> Segment:
     return Segment(what, float(work.time[part[0]]), float(work.time[part[1] - 1]), used)
 
 
-def held_at_first(work: Work) -> Finding | None:
-    """Report a hold before the first motion."""
-    first = work.segments[0]
-    if first.what != "held":
-        return None
-    begin = moment(work.segments[1].from_s)
-    return work.finding("held-start", span=(first.from_s, first.to_s), begin=begin)
-
-
-def rest_at_last(work: Work) -> Finding | None:
-    """Report a rest after the last motion."""
-    last = work.segments[-1]
-    if last.what != "rest" or len(work.segments) == 1:
-        return None
-    return work.finding("rest-tail", span=(last.from_s, last.to_s), begin=moment(last.from_s))
+def held_or_at_rest(work: Work) -> None:
+    """Report a hold before the first motion, and a rest after the last."""
+    first, last = work.segments[0], work.segments[-1]
+    if first.what == "held":
+        begin = moment(work.segments[1].from_s)
+        work.note("held-start", span=(first.from_s, first.to_s), begin=begin)
+    if last.what == "rest" and len(work.segments) > 1:
+        work.note("rest-tail", span=(last.from_s, last.to_s), begin=moment(last.from_s))
 
 
 def zero(work: Work) -> Finding | None:

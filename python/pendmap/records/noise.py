@@ -5,18 +5,16 @@ The noise is the residual of local polynomials over the filter's gain. Three fau
 - Slow sampling leaves motion in the residual: the degree is raised until the residual no longer
   decreases.
 - Readings that share a coarse count have equal errors: samples at least a count apart are fitted
-  instead. For slower motion the estimate is count/sqrt(12), the lower bound. At rest it is derived
-  from the frequencies of the counts (:func:`pendmap.records.resolution.still_noise`).
+  instead. For slower motion the estimate is count/sqrt(12), the lower bound.
 - Windows with outliers beyond eight robust standard deviations, among samples of similar speed, are
   excluded; the noise is the root mean square of the others.
 
-Correlated noise is underestimated: ``colour`` is the dependence of the estimate on the filter.
+Correlated noise is underestimated.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import itertools
 import math
 from typing import TYPE_CHECKING, Final
 
@@ -25,7 +23,7 @@ import numpy as np
 from pendmap.errors import InputError, short_repr
 from pendmap.records.experiment import Experiment, Run
 from pendmap.records.jitter import SpeedLaw, law_of, speed_of
-from pendmap.records.resolution import step_of, still_noise
+from pendmap.records.resolution import step_of
 from pendmap.signal.local_polynomial import local_fit
 from pendmap.signal.robust import broad_scale, widened
 
@@ -43,7 +41,6 @@ WAY_PHASE: Final = 0.25  # Phase over which displacements are measured, rad, unl
 DITHERED: Final = 0.55  # Noise over count above which neighbouring errors are independent
 CLEAR_WAY: Final = 4  # Least displacement from which a speed is computed, counts
 TOO_FEW: Final = 0.3  # Phase between samples, rad, above which polynomials fail: upper bound only
-SPEED_RANGES: Final = 4  # Ranges of speed, with equally many samples each, with a reported noise
 OUTLIER: Final = 8.0  # Standard deviations above which a residual is an outlier
 FEWEST_RESIDUALS: Final = 40  # Fewest residuals from which a standard deviation is estimated
 OUTLIER_RANGES: Final = 16  # Most ranges of speed with separate outlier limits
@@ -55,17 +52,6 @@ STIFF_STRIDE: Final = 2.0  # Factor on FARTHEST for the highest degree
 
 
 @dataclasses.dataclass(frozen=True)
-class SpeedRange:
-    """Noise of samples of similar speed."""
-
-    speed_from: float  # rad/s
-    speed_to: float  # rad/s
-    sigma: float  # rad
-    stderr: float  # rad
-    samples: int  # number of residuals
-
-
-@dataclasses.dataclass(frozen=True)
 class NoiseFloor:
     """Standard deviation of readings about a smooth motion.
 
@@ -74,13 +60,8 @@ class NoiseFloor:
     sigma, stderr : float
         Noise and its standard error, rad, including rounding to counts; ``nan`` with too few
         samples.
-    by_speed : tuple of SpeedRange
-        Noise in ranges of speed, from slow to fast.
     limited_by_count : bool
         Whether ``sigma`` is count/sqrt(12), the lower bound set by the resolution.
-    colour : float
-        Estimate of the quartic over that of the next degree: 1 for white noise, more if the noise
-        is correlated from sample to sample or the motion is not followed.
     samples : int
         Number of residuals.
     law : SpeedLaw or None
@@ -91,9 +72,7 @@ class NoiseFloor:
 
     sigma: float
     stderr: float
-    by_speed: tuple[SpeedRange, ...] = ()
     limited_by_count: bool = False
-    colour: float = 1.0
     samples: int = 0
     law: SpeedLaw | None = None
     bound: bool = False
@@ -113,8 +92,8 @@ def noise_floor(run: Run | Experiment) -> NoiseFloor:
     Returns
     -------
     NoiseFloor
-        Noise in rad against the speed in rad/s; of a gyroscope alone in rad/s against its change in
-        rad/s^2. ``nan`` if only turning points are known or there are too few samples.
+        Noise in rad; of a gyroscope alone in rad/s. ``nan`` if only turning points are known or
+        there are too few samples.
 
     Examples
     --------
@@ -176,19 +155,13 @@ def _noise(time: Floats, theta: Floats, bad: Mask, count: float) -> NoiseFloor |
     if first.middle.size < FEWEST_RESIDUALS:
         return None
     fit = raise_degree(fitted, first) if slow else first
-    next_fit = fitted(degree=6, points=11)
-    enough = next_fit.middle.size >= FEWEST_RESIDUALS
-    colour = first.rms / max(next_fit.rms, 1e-300) if enough else 1.0
-    least, slowest, law = count / math.sqrt(12), 0.0, None
+    least, law = count / math.sqrt(12), None
     if count and fit.rms < DITHERED * count:
         far = fit_with_stride(fitted, count, interval, swing, fit if slow else None)
         if far is None:
-            still = still_noise(theta if bad.all() else theta[~bad], count)
-            if still is not None:
-                return NoiseFloor(*still, colour=colour, samples=int(theta.size))
             sigma = max(least, fit.rms)
-            return NoiseFloor(sigma, least / 10, limited_by_count=True, colour=colour)
-        fit, slowest = far
+            return NoiseFloor(sigma, least / 10, limited_by_count=True)
+        fit = far
     else:
         # A residual has the noise of all samples of its window, each with its own speed.
         square = np.convolve(speed**2, fit.shares, "same")[fit.middle]
@@ -197,9 +170,7 @@ def _noise(time: Floats, theta: Floats, bad: Mask, count: float) -> NoiseFloor |
     return NoiseFloor(
         sigma=max(fit.rms, least),
         stderr=fit.stderr,
-        by_speed=tuple(_ranges(fit, least, slowest)),
         limited_by_count=fit.rms < least,
-        colour=colour,
         samples=fit.middle.size,
         law=None if few else law,
         bound=few,
@@ -227,23 +198,6 @@ def fastest(time: Floats, theta: Floats, count: float) -> tuple[float, float]:
         phase = max(way / (lag * interval * length), slowest)
     swing = phase if float(np.ptp(theta)) > math.tau else phase * length / reach
     return min(phase, math.pi / interval), min(max(swing, slowest), math.pi / interval)
-
-
-def _ranges(fit: LocalFit, least: float, slowest: float) -> list[SpeedRange]:
-    """Return the noise in ranges of speed; below ``slowest``, that of the count."""
-    speed = np.abs(fit.slope)
-    number = max(min(SPEED_RANGES, fit.middle.size // FEWEST_RESIDUALS), 1)
-    edges = np.quantile(speed, np.linspace(0, 1, number + 1))
-    ranges = []
-    if slowest > 0:
-        ranges.append(SpeedRange(0.0, slowest, least, least / 10, 0))
-        edges[0] = slowest
-    for low, high in itertools.pairwise(edges.tolist()):
-        part = fit.only((speed >= low) & (speed <= high))
-        if part.middle.size:
-            sigma = max(part.rms, least)
-            ranges.append(SpeedRange(low, high, sigma, part.stderr, part.middle.size))
-    return ranges
 
 
 def grows(work: Work) -> Finding | None:
@@ -297,8 +251,8 @@ def fit_with_stride(
     interval: float,
     swing: float,
     nearest: LocalFit | None,
-) -> tuple[LocalFit, float] | None:
-    """Return a fit of samples at least a count apart, and the least speed at which they are.
+) -> LocalFit | None:
+    """Return a fit of samples at least a count apart.
 
     ``nearest`` is the fit of neighbours if sampling is slow, else None.
     """
@@ -328,7 +282,6 @@ def fit_with_stride(
     )
     # Overlapping residuals: the pooled fit has the effective number of the first one.
     worth = fits[0].sum_of_squares * middle.size / fits[0].middle.size
-    pooled = dataclasses.replace(
+    return dataclasses.replace(
         fits[0], middle=middle, residual=residual, slope=slope, sum_of_squares=worth
     )
-    return pooled, slowest

@@ -2,7 +2,7 @@
 
 A push changes the velocity of a pendulum, but its angle is continuous: a jump that persists is an
 error of the sensor, one that returns an outlier. A jump makes one difference between samples wrong,
-an outlier two. Samples at an end of a record or a gap are predicted from those further inside.
+an outlier two. Samples at an end of a record or a gap are judged by a cubic.
 """
 
 from __future__ import annotations
@@ -14,8 +14,7 @@ import numpy as np
 
 from pendmap.formatting import counted, moment
 from pendmap.records.clock import longest_between
-from pendmap.records.from_acceleration import swinging
-from pendmap.records.noise import DEGREES, noise_of
+from pendmap.records.noise import DEGREES
 from pendmap.records.rod_sensors import angle_of_rate
 from pendmap.records.slips import slips_of
 from pendmap.records.work import Jump
@@ -26,7 +25,6 @@ if TYPE_CHECKING:
     from pendmap.records.experiment import Finding
     from pendmap.records.work import Work
     from pendmap.signal import Floats, Indices, Mask
-    from pendmap.signal.local_polynomial import LocalFit
 
     _Group = slice | Indices
 
@@ -36,6 +34,7 @@ SCALE_SAMPLES: Final = 151  # Samples from which the local standard deviation is
 PASSES: Final = 8  # Most searches for outliers; each may reveal one next to another
 MOST_OUTLIERS: Final = 0.1  # Greatest share of outliers; with more, no sample is marked
 SIDE: Final = 10  # Samples on each side from which a sample is judged
+GAP: Final = 4.0  # Gap, intervals, that windows do not cross
 MOST_TOGETHER: Final = 6  # Most neighbouring outliers that are distinguished from the motion
 WEIGHT_STEPS: Final = 10  # Iterations of the weights of least absolute deviations
 CERTAIN_JUMP: Final = 7.0  # Standard errors above which a step is a jump
@@ -43,10 +42,6 @@ OFF_COUNT: Final = 0.25  # Greatest deviation of a corrected jump from whole cou
 MOST_JUMPS: Final = 20  # Most jumps that are corrected
 OFF_TURN: Final = 0.1  # Greatest deviation of a jump from whole turns, rad
 OTHER_RECORD: Final = 0.5  # Size of a jump, rad, above which a second recording may begin
-END_SAMPLES: Final = 10  # Samples of each end that are compared with predictions
-END_GAP: Final = POINTS // 2  # Longest gap, intervals, that windows cross
-PREDICTIONS: Final = 40  # Predictions further inside that give the usual error
-END_DEGREES: Final = (2, 3)  # Degrees of the predicting polynomials
 
 
 def outliers(work: Work) -> Finding | None:
@@ -74,7 +69,9 @@ def outliers(work: Work) -> Finding | None:
                 jumps.append(jump)
                 theta[jump.at :] -= jump.size
         _bridge(work.time, theta, false)
-    false |= ~corner & false_ends(work.time, theta, ~(bad | false), SUSPECT, work.count)
+    for end in _ends(work.time):  # windows end before them
+        away = np.abs(_smooth(work.time[end] - work.time[end[0]], theta[end]))
+        false[end] |= ~corner[end] & (away > SUSPECT * normal_scale(away) + 2 * work.count)
     _bridge(work.time, theta, false)
     work.jumps = sorted(jumps, key=lambda jump: jump.at)
     moved = np.zeros(theta.size)
@@ -82,6 +79,14 @@ def outliers(work: Work) -> Finding | None:
         moved[jump.at :] += jump.size
     work.bridged = theta + moved
     return _distrust(work, np.flatnonzero(false & work.trusted), work.theta - moved - theta, "rad")
+
+
+def _ends(time: Floats) -> list[Indices]:
+    """Return the samples at the ends of a record and of its gaps."""
+    steps = np.diff(time)
+    pieces = np.split(np.arange(time.size), np.flatnonzero(steps > GAP * np.median(steps)) + 1)
+    long = [piece for piece in pieces if piece.size >= 2 * SIDE]
+    return [end for piece in long for end in (piece[: 2 * SIDE], piece[-2 * SIDE :])]
 
 
 def _distrust(work: Work, at: Indices, away: Floats, unit: str) -> Finding | None:
@@ -114,7 +119,7 @@ def _judged(
 
 def _suspects(work: Work, theta: Floats) -> tuple[Indices, Floats]:
     """Return samples far from their neighbours, and the standard deviation around each."""
-    from scipy.ndimage import median_filter
+    from scipy.ndimage import maximum_filter1d, median_filter
 
     best, *others = (
         local_fit(work.time, theta, degree=degree, points=points) for degree, points in DEGREES[:3]
@@ -127,16 +132,11 @@ def _suspects(work: Work, theta: Floats) -> tuple[Indices, Floats]:
         return np.empty(0, np.intp), np.empty(0)
     near = 1.4826 * median_filter(size, size=min(SCALE_SAMPLES, size.size), mode="nearest")
     scale = np.maximum(near, max(broad_scale(size), 1e-9))
-    which = (size > SUSPECT * scale + 2 * work.count) & _highest(best)
+    highest = maximum_filter1d(
+        size, 2 * best.neighbours + 1, mode="nearest"
+    )  # of windows in common
+    which = (size > SUSPECT * scale + 2 * work.count) & (size >= highest)
     return best.middle[which], scale[which]
-
-
-def _highest(fit: LocalFit) -> Mask:
-    """Return the mask of residuals that are the largest of all overlapping windows."""
-    from scipy.ndimage import maximum_filter1d
-
-    size = np.abs(fit.residual)
-    return np.asarray(size >= maximum_filter1d(size, 2 * fit.neighbours + 1, mode="nearest"), bool)
 
 
 def _judge(
@@ -264,76 +264,24 @@ def _whole(jump: Jump, count: float) -> int:
 
 
 def spikes(work: Work) -> Finding | None:
-    """Mark readings of a sensor on the rod far from their neighbours, in free swings; no jumps."""
+    """Mark readings of a sensor on the rod far from all their neighbours; steps are none."""
+    from scipy.ndimage import median_filter
+
     sensor = work.angle_source
-    if sensor is None:
-        values, unit, free = work.extra["velocity"], "rad/s", [(0, work.time.size)]
-    else:
-        # The acceleration is checked, since the angle computed from it has corners.
-        values, unit = work.extra["acceleration"], sensor.unit
-        free, _ = swinging(work.time, values, noise_of(work.time, values).sigma)
-    if work.time.size < 2 * POINTS:
-        return None
+    # The acceleration is checked, since the angle computed from it has corners.
+    values = work.extra["velocity"] if sensor is None else work.extra["acceleration"]
     fit = local_fit(work.time, values)
     size = np.abs(fit.residual)
     if size.size < POINTS:
         return None
-    at = fit.middle[(size > 2 * SUSPECT * broad_scale(size)) & _highest(fit)]
-    inside = np.zeros(values.size, bool)
-    for low, high in free:
-        begin = low + POINTS if low else 0
-        inside[begin : high if high == values.size else high - POINTS] = True
-    at = at[inside[at]]
+    away = values - median_filter(values, 5, mode="nearest")
+    limit = 2 * SUSPECT * broad_scale(size)
+    at = fit.middle[(size > limit) & (np.abs(away[fit.middle]) > limit)]
     if at.size > MOST_OUTLIERS * values.size:
         return None
-    away = np.zeros(values.size)
-    away[at] = [values[k] - np.median(values[max(k - SIDE, 0) : k + SIDE + 1]) for k in at]
-    return _distrust(work, at, away, unit)
+    return _distrust(work, at, away, "rad/s" if sensor is None else sensor.unit)
 
 
 def integrate_again(work: Work) -> None:
     """Integrate a rate without the readings that are marked."""
     work.theta = angle_of_rate(work.time, work.extra["velocity"], work.trusted)
-
-
-def false_ends(time: Floats, theta: Floats, trusted: Mask, limit: float, count: float) -> Mask:
-    """Return the mask of outliers at ends and gaps; ``limit`` is in usual errors of prediction."""
-    false = np.zeros(theta.size, bool)
-    good = np.flatnonzero(trusted)
-    if good.size < 2:
-        return false
-    interval = float(np.median(np.diff(time[good])))
-    cuts = np.flatnonzero(np.diff(time[good]) > END_GAP * interval) + 1
-    near = END_SAMPLES + PREDICTIONS + POINTS
-    for piece in np.split(good, cuts):
-        if piece.size < near:
-            continue
-        for end in (piece[:near], piece[:-near:-1]):
-            lag = (time[end] - time[end[0]]) / interval
-            false[end[:END_SAMPLES]] |= _missed_at_end(lag, theta[end].copy(), limit, count)
-    return false
-
-
-def _missed_at_end(lag: Floats, theta: Floats, limit: float, count: float) -> Mask:
-    """Return the mask of outliers among the first readings, tested from the inside outward."""
-    inner = np.arange(END_SAMPLES, lag.size - POINTS)
-    tried = {
-        degree: normal_scale(theta[inner] - _before(lag, theta, inner, degree))
-        for degree in END_DEGREES
-    }
-    degree = min(tried, key=tried.__getitem__)
-    missed = np.zeros(END_SAMPLES, bool)
-    for k in range(END_SAMPLES - 1, -1, -1):
-        there = float(_before(lag, theta, np.array([k]), degree)[0])
-        if abs(theta[k] - there) > limit * tried[degree] + 2 * count:
-            missed[k] = True
-            theta[k] = there
-    return missed
-
-
-def _before(lag: Floats, theta: Floats, places: Indices, degree: int) -> Floats:
-    """Return predictions from polynomials fitted to the nine samples after each index."""
-    behind = places[:, None] + np.arange(1, POINTS + 1)
-    x = lag[behind] - lag[places, None]
-    powers = (x / x[:, -1:])[:, :, None] ** np.arange(degree + 1)
-    return np.asarray(np.einsum("mp,mp->m", np.linalg.pinv(powers)[:, 0, :], theta[behind]))

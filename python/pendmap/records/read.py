@@ -14,8 +14,7 @@ from pendmap.formatting import counted, listed
 from pendmap.records.across import checked_together
 from pendmap.records.channels import channels_of
 from pendmap.records.description import NAME, Description, RunPlan, read_description
-from pendmap.records.experiment import Experiment, Finding, Run
-from pendmap.records.findings import finding_of
+from pendmap.records.experiment import Experiment, Finding, Run, finding_of
 from pendmap.records.rod_sensors import gyroscope_of
 from pendmap.records.rules import OF_RELEASE, RULES, apply
 from pendmap.records.tables import is_frame, read_table, table_of
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
 
 
 # Suffixes of the files that are records in a folder without a description
-TABLES: Final = (".csv", ".tsv", ".txt", ".dat", ".parquet", ".pq", ".xlsx", ".xls")
+TABLES: Final = (".csv", ".tsv", ".txt", ".dat", ".parquet", ".pq", ".xlsx")
 _FORMS: Final = (
     "paths, DataFrames with columns like t_s and theta_rad, an Experiment like"
     " pendmap.read_experiment('folder'), Runs or a list of them"
@@ -263,7 +262,7 @@ def _run(work: Work, name: str, digest: str) -> Run:
         acceleration=work.extra.get("acceleration"),
         accelerometer=work.angle_source,
         gyroscope=gyroscope,
-        drive=plan.drive,
+        drive=dataclasses.asdict(plan.drive) if plan.drive else None,
         pivot=work.pivot or None,
         pivot_unit=work.pivot_unit,
         findings=tuple(dataclasses.replace(f, where=f.where or name) for f in work.findings),

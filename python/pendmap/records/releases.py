@@ -1,75 +1,39 @@
-"""Releases of a free record: detection of the free motions between holds and touches by hand."""
+"""Releases of a free record: motions between holds by hand, and those that a trigger marks."""
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendmap.formatting import counted, listed
 from pendmap.signal.half_cycles import after_turns, swings
-from pendmap.signal.local_polynomial import local_fit
-from pendmap.signal.robust import between, even_times, normal_scale, stretches, widened
+from pendmap.signal.robust import stretches
 
 if TYPE_CHECKING:
+    from pendmap.records.experiment import Finding
     from pendmap.records.work import Work
-    from pendmap.signal import Floats, Mask, Stretch
+    from pendmap.signal import Floats, Indices, Stretch
 
 
-RELEASE_RISE: Final = 0.1  # Growth of a swing, over the largest, that only a hand causes
+RELEASE_RISE: Final = 0.1  # Relative growth of a swing that only a hand causes
+LONG_HALF: Final = 1.4  # Duration of a half cycle, over the usual one, that only a hand causes
+GAP: Final = 4.0  # Intervals without a reading that make the duration of a half cycle uncertain
 HELD_LONGER: Final = 1.5  # Delay, over that of a release from rest, above which there is a hold
 NEAR_UPRIGHT: Final = 0.05  # Sine of an angle below which a release is too slow to detect
-HOLD_WINDOWS: Final = ((0.5, 0.2), (0.7, 0.4))  # Windows before a motion tested for a hold, periods
-FEWEST_HELD: Final = 10  # Fewest samples of a hold
 FEWEST_HALF_CYCLES: Final = 5  # Fewest half cycles of a release that is a run, about three swings
-HAND_SHARE: Final = 0.3  # Least torque by a hand, over the greatest restoring torque nearby
-DERIVATIVE_SPAN: Final = 0.2  # Window of the polynomials that give second derivatives, periods
-CERTAIN_HAND: Final = 6.0  # Least acceleration by a hand, standard deviations of its noise
-USUAL_REMAINDER: Final = 4.0  # Least acceleration by a hand, over the median residual
-FEWEST_A_PERIOD: Final = 20.0  # Fewest samples per period from which second derivatives are taken
-FREE_SHARE: Final = 0.6  # Share of the samples kept by least trimmed squares
-CONCENTRATIONS: Final = 12  # Number of concentration steps; half as many usually suffice
-SHORTEST_HOLD: Final = 0.5  # Shortest hold by a hand, periods
+BETWEEN_LEVELS: Final = 0.02  # Greatest share of samples between the two levels of a trigger
+DEAD_BAND: Final = 0.2  # Half-width of the hysteresis band, over the distance of the levels
+RELEASES_APART: Final = 3.0  # Least time between releases, periods of small swings
 
 
 def releases(work: Work, parts: list[Stretch]) -> list[Stretch]:
-    """Return the stretches of motions ``parts`` that are not touched by a hand, in order."""
-    hand = touched(work, parts)
-    free = without_hand(work.time, parts, hand, work.period)
-    free = [(_let_go(work, part, hand), part[1]) for part in free]
-    return [piece for part in free for piece in grown(work, part)]
-
-
-def _let_go(work: Work, part: Stretch, hand: Mask) -> int:
-    """Return the index at which a motion has certainly left the quiet hold before it."""
-    low, high = part
-    for shares in HOLD_WINDOWS:
-        times = work.time[low] - np.array(shares) * work.period
-        before, sure = np.searchsorted(work.time, times).tolist()
-        level = _quiet(work, before, sure)
-        left = None if level is None else _left(work, (sure, high), level)
-        if left is None:
-            continue
-        if not hand[before:low].all():
-            return max(low, left)
-        # The hand holds the pendulum until the motion begins.
-        begin = held_short(work, (before, high))
-        return low if begin is None else min(low, begin)
-    return low
-
-
-def _quiet(work: Work, low: int, high: int) -> float | None:
-    """Return the median of constant readings; None if they drift or scatter beyond the noise."""
-    hold = work.theta[low:high][work.trusted[low:high]]
-    if hold.size < FEWEST_HELD:
-        return None
-    # A trembling hand drifts more than noise.
-    early, late = np.array_split(hold, 2)
-    drift = abs(float(np.mean(early) - np.mean(late)))
-    spread = float(np.diff(np.quantile(hold, [0.05, 0.95]))[0])
-    still = spread <= max(4 * work.noise, 2 * work.count)
-    calm = drift <= max(4 * work.noise / math.sqrt(hold.size), work.count / 4)
-    return float(np.median(hold)) if still and calm else None
+    """Return the stretches of motions ``parts`` that begin with a release, in order."""
+    pieces = [piece for part in parts for piece in grown(work, part)]
+    begin = held_short(work, pieces[0]) if pieces else None
+    return pieces if begin is None else [(begin, pieces[0][1]), *pieces[1:]]
 
 
 def _seen(work: Work) -> float:
@@ -99,35 +63,54 @@ def enough(work: Work, part: Stretch) -> bool:
 
 
 def grown(work: Work, part: Stretch) -> list[Stretch]:
-    """Divide a motion at growing swings: a hand took the pendulum and released it again."""
+    """Divide a motion where a hand took the pendulum: swings that grow or last too long."""
+    from scipy.ndimage import median_filter
+
     low, high = part
     good = np.flatnonzero(work.trusted[low:high]) + low
     if good.size < 5:
         return []
     good = good[after_turns(work.theta[good] - work.middle) :]
-    half = swings(work.time[good], work.theta[good] - work.middle, least=work.limit)
-    size = np.abs(half.peak)
-    if size.size < 4:
+    time, theta = work.time[good], work.theta[good] - work.middle
+    half = swings(time, theta, least=work.limit)
+    if half.peak.size < 4:
         return [part]
+    # The readings after the last crossing may be those of a hand.
+    late = np.max(np.abs(theta[time > half.crossing[-1]]), initial=0.0)
+    size, crossing = np.append(np.abs(half.peak), late), np.append(half.crossing, time[-1])
+    places = np.searchsorted(work.time, crossing).tolist()
+    lasts, steps = np.diff(half.crossing), np.diff(time)
+    long = lasts > LONG_HALF * median_filter(lasts, 5, mode="nearest")
+    for k in np.flatnonzero(steps > GAP * np.median(steps)).tolist():
+        long &= (half.crossing[1:] < time[k]) | (half.crossing[:-1] > time[k + 1])
+    # The half cycle before may be that of the hand, too.
+    hands = [(places[max(k - 1, 0)], places[k + 1]) for k in np.flatnonzero(long).tolist()]
+    before = np.abs(theta[time < crossing[0]])
+    if np.argmax(before) and (1 + RELEASE_RISE) * before.max() + 2 * work.limit < size[1]:
+        hands.append((low, places[int(np.argmax(size)) + 1]))  # pushed from rest
     # Pairs of neighbours: an offset makes every other half cycle larger.
     pairs = np.maximum(size[:-1], size[1:])
-    rise = max(RELEASE_RISE * float(size.max()), 2 * work.limit)
-    cuts: list[Stretch] = []
+    # A single outlier raises two pairs.
+    lasting = np.minimum(pairs, np.append(pairs[2:], np.full(2, pairs[-1])))
     least, at = pairs[0], 0
     k = 1
     while k < pairs.size:
         if pairs[k] < least:
             least, at = pairs[k], k
-        elif pairs[k] > least + rise:
+        elif lasting[k] > (1 + RELEASE_RISE) * least + 2 * work.limit:
             top = k
             while top + 1 < pairs.size and pairs[top + 1] > pairs[top] * 1.001:
                 top += 1
-            ends = (min(at + 1, size.size - 1), top + int(np.argmax(size[top : top + 2])))
-            stop, go = np.searchsorted(work.time, half.peak_time[list(ends)])
-            cuts.append((int(stop), int(go)))
+            top += int(np.argmax(size[top : top + 2]))
+            # After a hold of unknown length the motion is free where it first passes the middle.
+            hands.append((places[at + 1], places[top + 1]))
+            top = min(top, pairs.size - 1)
             least, at, k = pairs[top], top, top
         k += 1
-    return [(a, b) for a, b in between(cuts, low, high) if b - a > 5]
+    free = np.ones(high - low, bool)
+    for begin, end in hands:
+        free[begin - low : end - low] = False
+    return [(low + a, low + b) for a, b in stretches(free) if b - a > 5]
 
 
 def held_short(work: Work, part: Stretch) -> int | None:
@@ -155,85 +138,51 @@ def held_short(work: Work, part: Stretch) -> int | None:
     return left if held else None
 
 
-def touched(work: Work, parts: list[Stretch]) -> Mask:
-    """Return the mask of samples of a free record that a hand moves, shape (N,).
+def edges_of(values: Floats, edge: str | None = None) -> tuple[Indices, str]:
+    """Return the first samples after each edge, and the direction of the edges.
 
-    There the residual of ``th'' + w0^2 sin(th - th0) + c th' + Tr sign(th')`` is large; the
-    coefficients are estimated by least trimmed squares over the moving ``parts``.
+    Missing values keep the level. By default rising edges are used, or falling ones if there are no
+    others. Without two levels there are no edges.
     """
-    from scipy.ndimage import maximum_filter1d
-    from scipy.signal import savgol_filter
-
-    none = np.zeros(work.time.size, bool)
-    good, period = work.trusted, work.period
-    interval, even = even_times(work.time)
-    count, window = even.size, max(round(DERIVATIVE_SPAN * period / interval), 5) | 1
-    if period / interval < FEWEST_A_PERIOD or count < 4 * window:
-        return none
-    theta = np.interp(even, work.time[good], work.theta[good])
-    bend = savgol_filter(theta, window, 3, deriv=2, delta=interval)
-    speed = savgol_filter(theta, window, 3, deriv=1, delta=interval)
-    columns = np.column_stack([np.sin(theta), np.cos(theta), speed, np.sign(speed)])
-    moving = np.zeros(count, bool)
-    for low, high in parts:
-        moving[(even >= work.time[low]) & (even <= work.time[high - 1])] = True
-    if not moving.any():
-        return none
-    fitted = _trimmed(columns[moving], -bend[moving], (2 * math.pi / period) ** 2)
-    gravity = float(np.hypot(fitted[0], fitted[1]))
-    if not 0.3 < gravity / (2 * math.pi / period) ** 2 < 3:
-        return none
-    rest = np.abs(bend + columns @ fitted)
-    pull = np.abs(columns[:, :2] @ fitted[:2])
-    # The smaller of the torques of the half swings before and after, which may differ by a hand.
-    half = round(period / interval / 2)
-    sides = [
-        maximum_filter1d(pull, 2 * half + 1, mode="nearest", origin=side * half) for side in (-1, 1)
-    ]
-    restoring = np.minimum(*sides)
-    noise = normal_scale(local_fit(work.time[good], work.theta[good]).residual)
-    # A second derivative by least squares over n samples: sigma sqrt(720 / n^5) / dt^2.
-    error = max(noise, work.count / math.sqrt(12)) * math.sqrt(720 / window**5) / interval**2
-    usual = USUAL_REMAINDER * float(np.median(rest[moving]))
-    moved = rest > np.maximum(np.maximum(HAND_SHARE * restoring, CERTAIN_HAND * error), usual)
-    # In gaps there are no readings from which a hand can be detected.
-    places = np.flatnonzero(good)
-    gaps = np.flatnonzero(np.diff(work.time[good]) > window * interval / 4)
-    for k in gaps:
-        low, high = work.time[places[k]], work.time[places[k + 1]]
-        moved[(even > low - period / 4) & (even < high + period / 4)] = False
-    moved[(even < work.time[places[0]] + period / 4) & ~good[0]] = False
-    moved[(even > work.time[places[-1]] - period / 4) & ~good[-1]] = False
-    moved = widened(moved, window // 2)
-    nearest = np.clip(np.round((work.time - work.time[0]) / interval), 0, count - 1)
-    return np.asarray(moved[nearest.astype(np.intp)], bool)
+    seen = values[np.isfinite(values)]
+    low, high = float(np.min(seen, initial=np.inf)), float(np.max(seen, initial=-np.inf))
+    middle, band = (low + high) / 2, DEAD_BAND * (high - low)
+    if not low < high or np.mean(np.abs(seen - middle) < band) > BETWEEN_LEVELS:
+        return np.empty(0, np.intp), "of two levels"
+    places = np.flatnonzero(np.abs(values - middle) > band)
+    above = (values[places] > middle).astype(np.int8)
+    turns = np.diff(above, prepend=above[0])
+    rising, falling = places[turns > 0], places[turns < 0]
+    edge = edge or ("rising" if rising.size or not falling.size else "falling")
+    return (rising if edge == "rising" else falling), edge
 
 
-def _trimmed(columns: Floats, target: Floats, gravity: float) -> Floats:
-    """Return coefficients by least trimmed squares (Rousseeuw & Van Driessen, 2006)."""
-    answer = np.array([gravity, *[0.0] * (columns.shape[1] - 1)])
-    for _ in range(CONCENTRATIONS):
-        away = np.abs(target - columns @ answer)
-        agree = away <= np.quantile(away, FREE_SHARE)
-        answer = np.linalg.lstsq(columns[agree], target[agree], rcond=None)[0]
-    return answer
-
-
-def without_hand(time: Floats, parts: list[Stretch], hand: Mask, period: float) -> list[Stretch]:
-    """Return the stretches of motions in which no hand holds the pendulum."""
-    touches: list[Stretch] = []
-    for a, b in stretches(hand):
-        # Touches separated by less than half the shortest hold are one hold.
-        if touches and time[a] - time[touches[-1][1] - 1] < SHORTEST_HOLD * period / 2:
-            a, _ = touches.pop()  # noqa: PLW2901 (joined)
-        touches.append((a, b))
-    held = np.zeros(time.size, bool)
-    for a, b in touches:
-        if time[b - 1] - time[a] >= SHORTEST_HOLD * period:
-            # A carried pendulum may briefly move like a free one: join touches within a period.
-            near = [
-                t for t in touches if time[a] - time[t[1] - 1] < period > time[t[0]] - time[b - 1]
-            ]
-            held[near[0][0] : near[-1][1]] = True
-    free = [(low + a, low + b) for low, high in parts for a, b in stretches(~held[low:high])]
-    return [(a, b) for a, b in free if b - a > 5 and time[b - 1] - time[a] > SHORTEST_HOLD * period]
+def marked(work: Work) -> Finding | None:
+    """Keep the motion after each edge of a trigger that marks releases."""
+    if not work.parts or "trigger" not in work.extra:
+        return None
+    places, edge = edges_of(work.extra["trigger"], work.edge)
+    if not places.size:
+        return work.finding("trigger-unlike.none", edge=edge)
+    edges: list[int] = []  # without bounces
+    for k in places.tolist():
+        if not edges or work.time[k] - work.time[edges[-1]] > work.period:
+            edges.append(k)
+    apart = np.diff(work.time[edges])
+    if apart.size and np.median(apart) < RELEASES_APART * work.period:
+        number = counted(len(edges), f"{edge} edge")
+        return work.finding("trigger-unlike.often", edges=number, apart=np.median(apart))
+    motions = []
+    for low, high in itertools.pairwise([*edges, work.time.size]):
+        after = [(max(a, low), min(b, high)) for a, b in work.parts if a < high and b > low]
+        if after:
+            a, b = max(after, key=lambda part: part[1] - part[0])
+            # The trigger locates the release to a sample, the angle to a fraction of a swing.
+            motions.append((low if work.time[a] - work.time[low] < work.period else a, b))
+    if not motions:
+        return work.finding("trigger-unlike.still")
+    work.parts = motions
+    times = listed([f"{work.time[k]:.6g}" for k in edges], 6)
+    number, bounces = counted(len(edges), "release"), places.size - len(edges)
+    more = f"; {counted(bounces, 'bounce')} left out" if bounces else ""
+    return work.finding("trigger-release", edge=edge, releases=number, times=times, bounces=more)

@@ -1,9 +1,5 @@
 """Resolution of readings: their step, encoder edges, and whether they suffice for a fit.
 
-At rest, a sensor with noise ``s`` below a count shows two or three counts around the angle ``x``:
-``P_k = Phi((k + 1/2 - x) / s) - Phi((k - 1/2 - x) / s)``, in counts. Their frequencies determine
-``x`` and ``s``; the noise is averaged over uniform priors of ``x`` and ``log s``.
-
 An encoder that logs each edge has no readings between edges; its angles are exact, its stamps have
 errors: ``theta_k = (n_k - sign(n_k - n_(k-1)) / 2) * step``.
 """
@@ -16,7 +12,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.formatting import counted
-from pendmap.records.periods import gain_of
+from pendmap.records.scale import gain_of
 
 if TYPE_CHECKING:
     from pendmap.records.experiment import Finding
@@ -29,11 +25,6 @@ GAIN_KNOWN: Final = 0.1  # Half-width of the gain's 95 % interval above which it
 LEAST_USED: Final = 0.1  # Share of readings in motion used by a fit below which a warning is given
 RESTING: Final = ("held", "rest")  # Segments without motion
 ON_STEPS: Final = 0.12  # Greatest rms distance from multiples of a step, in steps; chance: 0.29
-SPREADS: Final = np.geomspace(0.02, 1.0, 80)  # Grid of the noise before rounding, counts
-PLACES: Final = (np.arange(200) + 0.5) / 200 - 0.5  # Grid of the angle within a count, counts
-MOST_COUNTS: Final = 9  # Upper bound (exclusive) on the range of readings at rest, counts
-REST_PARTS: Final = 4  # Number of parts of a record at rest whose means are compared
-REST_DRIFT: Final = 4.0  # Greatest deviation of these means, standard errors
 EDGE_SHARE: Final = 0.95  # Share of single-count steps above which a record is a log of edges
 FEWEST_EDGES: Final = 50  # Fewest readings from which edges are recognized
 
@@ -53,7 +44,7 @@ def used_share(work: Work) -> Finding | None:
 def drive(work: Work) -> Finding | None:
     """Report a drive that is sampled too slowly."""
     rate = 1 / float(np.median(np.diff(work.time)))
-    drive = ((work.plan.drive or {}).get("Omega") or 0.0) / math.tau
+    drive = (work.plan.drive.Omega if work.plan.drive else 0.0) / math.tau
     if rate >= NYQUIST * drive:
         return None
     number, alias = rate / drive, abs(drive - rate * round(drive / rate))
@@ -101,35 +92,6 @@ def levels_shared(theta: Floats, step: float) -> float:
     """Return the factor on the noise of a mean by steps, each worth three readings."""
     levels = np.unique(np.round(theta / step)).size
     return math.sqrt(max(theta.size / (3 * max(levels, 1)), 1.0))
-
-
-def still_noise(theta: Floats, count: float) -> tuple[float, float] | None:
-    """Return the noise of readings at rest, and its error; None for one count, many or a drift."""
-    from scipy.special import log_ndtr, logsumexp, ndtr
-
-    steps = np.rint((theta - np.median(theta)) / count).astype(int)
-    low, high = int(steps.min()), int(steps.max())
-    if low == high or high - low >= MOST_COUNTS:
-        return None
-    error = float(np.std(steps)) * math.sqrt(REST_PARTS / steps.size)
-    means = [float(np.mean(part)) for part in np.array_split(steps, REST_PARTS)]
-    if max(means) - min(means) > 2 * REST_DRIFT * error:
-        return None
-    shown = np.bincount(steps - low)
-    centre = int(np.argmax(shown)) + low
-    # The smaller tail of the normal distribution is computed, to avoid cancellation.
-    level = np.arange(low, high + 1)[:, None, None] - centre - PLACES[None, :, None]
-    far, near = (np.abs(level) + side for side in (0.5, -0.5))
-    spread = SPREADS[None, None, :]
-    tail = log_ndtr(-near / spread) + np.log1p(
-        -np.exp(np.minimum(log_ndtr(-far / spread) - log_ndtr(-near / spread), -1e-12))
-    )
-    inside = np.log(np.maximum(1 - ndtr(near / spread) - ndtr(-far / spread), 1e-300))
-    likelihood = np.tensordot(shown, np.where(near > 0, tail, inside), axes=1)
-    weight = np.exp(logsumexp(likelihood, axis=0) - logsumexp(likelihood))
-    sigma = np.sqrt(SPREADS**2 + 1 / 12)
-    mean = float(weight @ sigma)
-    return count * mean, count * math.sqrt(float(weight @ (sigma - mean) ** 2))
 
 
 def logs_edges(theta: Floats) -> bool:

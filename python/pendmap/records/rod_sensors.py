@@ -1,4 +1,4 @@
-"""Accelerometers and gyroscopes on the rod, and their readings.
+"""Accelerometers and gyroscopes on the rod, and the angle that their readings give.
 
 An accelerometer measures acceleration less gravity. At the distance r from the pivot that is
 
@@ -6,8 +6,11 @@ An accelerometer measures acceleration less gravity. At the distance r from the 
     radial, toward the pivot             r th'^2 + g cos(th)
 
 and without g if the phone removes gravity ("linear acceleration"). An angular acceleration th''
-does not depend on the position. A gyroscope reads th' plus a bias; white noise of the rate is a
-random walk of its integral, so the rate itself is fitted.
+does not depend on the position. A free swing without damping has ``th'' = -w0**2 sin(th)``: a
+tangential sensor reads ``(g - r w0**2) sin(th)``, which is unambiguous below a quarter turn.
+
+A gyroscope reads th' plus a bias; white noise of the rate is a random walk of its integral, so the
+rate itself is fitted. Both angles serve as initial guess of a fit and for figures.
 """
 
 from __future__ import annotations
@@ -30,7 +33,7 @@ if TYPE_CHECKING:
 PLACE_EXAMPLE: Final = 'acceleration = { direction = "tangential", distance_m = 0.25 }'
 
 OVER_THE_TOP: Final = 4 * math.pi  # Range of angles above which a record contains rotations, rad
-FEWEST_PEAKS: Final = 4  # Fewest turning points from which a drift is estimated
+FEWEST_PEAKS: Final = 4  # Fewest turning points from which a drift or a period is estimated
 
 
 @dataclasses.dataclass(frozen=True)

@@ -20,10 +20,10 @@ from pendmap.records import (
     motion,
     noise,
     outliers,
+    releases,
     resolution,
     samples,
     scale,
-    trigger,
 )
 
 if TYPE_CHECKING:
@@ -47,28 +47,22 @@ WHEN: Final[Mapping[str, Callable[[Work], bool]]] = {
     "driven": lambda work: work.moves and not work.free,
 }
 RULES: Final[Rules] = (
-    ("always", trigger.drive_missing),
     # Times
     ("always", clock.missing),
     ("always", clock.stopped),
-    ("always", clock.wrapped),
     ("always", clock.restarted),
     ("always", clock.edge_stamps),
     ("always", clock.coarse),
-    ("always", clock.backwards),
     ("always", clock.repeated),
     ("always", clock.unordered),
     ("always", clock.gaps),
-    ("always", clock.jitter),
     ("always", clock.cut),
     ("sampled", clock.pause),
     # Angle
-    ("always", angle.undeclared_peaks),
     ("always", angle.turning_points),
     ("always", angle.source_missing),
     ("always", angle.derived),
     ("always", angle.missing),
-    ("always", angle.huge),
     ("sampled", angle.wrapped),
     ("sampled", resolution.edges),
     ("always", clock.no_clock),
@@ -94,16 +88,13 @@ RULES: Final[Rules] = (
     ("sampled", samples.named_step),
     # Motion
     ("moves", motion.free_motions),
-    ("moves", trigger.releases),
+    ("moves", releases.marked),
     ("moves", motion.used_motions),
-    ("moves", motion.held_at_first),
-    ("moves", motion.rest_at_last),
+    ("moves", motion.held_or_at_rest),
     # Other channels
-    ("driven", trigger.drive),
     ("moves", cross_checks.velocity),
     ("moves", cross_checks.acceleration),
     ("driven", cross_checks.pivot_unit),
-    ("driven", cross_checks.drive_sign),
     # What a fit can tell
     ("moves", resolution.used_share),
     ("moves", resolution.drive),
@@ -118,6 +109,6 @@ def apply(rules: Rules, work: Work) -> None:
     """Run rules on a record, in order, and note their findings."""
     for condition, rule in rules:
         finding = rule(work) if WHEN[condition](work) else None
-        work.findings += [noted for noted in (finding, work.doubt) if noted is not None]
-        work.doubt = None
+        if finding is not None:
+            work.findings.append(finding)
     work.refuse_short()

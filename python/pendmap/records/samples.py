@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
 EQUAL_READINGS: Final = 5  # Fewest consecutive equal readings that may be clipped or frozen
 FINEST: Final = 3e-5  # Step below which it is the last written digit, rad
-BEYOND_FIT: Final = 3.0  # Excess over a clipped plateau, over the rms residual of its parabola
-CLEARLY_CUT: Final = 0.05  # Excess over a plateau, over the range, that is certainly clipped
 # Order of the differences that vanish between readings, by kind of interpolation
 VANISHING_ORDER: Final = {"held": 1, "straight lines": 2, "cubics": 4}
 VANISHED: Final = 0.1  # Differences between readings, over the largest, below which they vanish
@@ -86,33 +84,13 @@ def clipped(work: Work) -> Finding | None:
             (a, b)
             for a, b in zip(low[ended[low]], high[ended[low]], strict=True)
             if a > 0 and b < work.theta.size and b - a > EQUAL_READINGS - 0.5
-            if _abrupt(work, a, b) and _cut_off(work, a, b)
+            if _abrupt(work, a, b)
         ]
         if len(hits) > 1 or (hits and hits[0][1] - hits[0][0] > 4 * EQUAL_READINGS):
             ends.append(f"{end:.4g}")
             marked |= ended  # including shorter plateaus
     at = np.flatnonzero(marked)
     return work.distrust(at, "clipped", "clipped sample", ends=" and ".join(ends), unit=unit)
-
-
-def _cut_off(work: Work, low: int, high: int) -> bool:
-    """Return whether a parabola through both sides exceeds a plateau."""
-    theta, count = work.theta, work.theta.size
-    if low < 3 or count - high < 3:
-        return False
-    if _missed(work, low, high) > CLEARLY_CUT * float(np.ptp(theta)):
-        return True
-    begin, end = equal_runs(theta, EQUAL_READINGS)
-    reach = max(high - low, 4)
-    first = max(low - reach, int(np.max(end[end < low], initial=0)))
-    last = min(high + reach, int(np.min(begin[begin > high], initial=count)))
-    places = np.r_[min(first, max(low - 4, 0)) : low, high : min(max(last, high + 4), count)]
-    time = work.time[places] - (work.time[low] + work.time[high - 1]) / 2
-    away = theta[places] - float(theta[low])
-    answer = np.polyfit(time, away, 2)
-    noise = float(np.sqrt(np.mean((away - np.polyval(answer, time)) ** 2)))
-    beyond = float(answer[2]) * -math.copysign(1, float(np.median(away)))
-    return beyond > 2 * work.count + BEYOND_FIT * noise
 
 
 def frozen(work: Work) -> Finding | None:
@@ -139,7 +117,8 @@ def _abrupt(work: Work, low: int, high: int) -> bool:
 
 def _missed(work: Work, low: int, high: int) -> float:
     """Return the expected displacement during a plateau from the speeds at its borders, rad."""
-    sides = (slice(max(low - 4, 0), low), slice(high, high + 4))
+    reach = max(high - low, 4)
+    sides = (slice(max(low - reach, 0), low), slice(high, high + reach))
     slopes = [
         float(np.ptp(work.theta[side]) / np.ptp(work.time[side]))
         for side in sides

@@ -1,35 +1,32 @@
-"""Rules of unit, scale and zero, from the period of a pendulum (:mod:`pendmap.records.periods`).
+"""Unit, scale and zero of the readings, from the period of a pendulum.
 
-Degrees mistaken for radians give periods that hardly increase, and impossible amplitudes.
+The period of a free swing increases with its amplitude A, ``T(A) = T0 (2/pi) K(sin(A/2))``: at one
+radian it is 6.6 % longer than that of small swings. Degrees mistaken for radians give periods that
+hardly increase, and impossible amplitudes.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from pendmap.model.quantities import GRAVITY
-from pendmap.records.periods import (
-    FEWEST_PERIODS,
-    LARGEST_SWING,
-    Periods,
-    factor_of,
-    growth,
-    middle_of,
-    periods_of,
-    share_of,
-)
 from pendmap.records.units import DEGREE
 from pendmap.signal.half_cycles import after_turns, swings
+from pendmap.signal.robust import Z95, normal_scale
 
 if TYPE_CHECKING:
     from pendmap.records.experiment import Finding
     from pendmap.records.work import Work
-    from pendmap.signal import Floats
+    from pendmap.signal import Floats, Indices
 
 
+FEWEST_PERIODS: Final = 6  # Fewest periods that are analysed
+LARGEST_SWING: Final = 3.0  # Largest amplitude, rad, at which the increase of the period is used
+LEAST_ERROR: Final = 1e-3  # Least relative error of a scale factor
 LONGEST_PERIOD: Final = 60.0  # Longest period of a laboratory pendulum, s
 SHORTEST_PERIOD: Final = 0.02  # Shortest period, s: a length of 0.1 mm
 # Units in which times are written as seconds, in s
@@ -44,21 +41,137 @@ BEFORE_REST: Final = 4  # Fewest half cycles before a rest; else it may be a hol
 MIDDLES_AGREE: Final = 0.1  # Greatest scatter of the middles, over the amplitude
 
 
+@dataclasses.dataclass(frozen=True)
+class Periods:
+    """Periods of a free swing against its amplitude."""
+
+    amplitude: Floats  # amplitude of the readings about their middle, shape (M,)
+    period: Floats  # s, shape (M,)
+
+    @property
+    def small(self) -> float:
+        """Median period of the smallest third of the swings, s."""
+        return float(np.median(self.period[self._smallest]))
+
+    @property
+    def smallest(self) -> float:
+        """Period of infinitesimal swings, s: ``small``, corrected for its amplitude if below pi."""
+        if float(np.min(self.amplitude)) >= math.pi:
+            return self.small
+        grown = growth(np.minimum(self.amplitude[self._smallest], 3.0))
+        return self.small / float(np.median(grown))
+
+    @property
+    def _smallest(self) -> Indices:
+        return np.argsort(self.amplitude)[: max(self.period.size // 3, 1)]
+
+
+def small_period(time: Floats, theta: Floats, count: float) -> float:
+    """Return the period of small swings, s; NaN if there are too few below half a turn."""
+    periods = periods_of(time, theta - (middle_of(time, theta) or 0.0), count)
+    if periods is None or float(np.min(periods.amplitude)) >= math.pi:
+        return math.nan
+    return periods.smallest
+
+
+def periods_of(time: Floats, theta: Floats, count: float) -> Periods | None:
+    """Return the periods of readings about 0; None if there are too few."""
+    start = after_turns(theta)
+    time, theta = time[start:], theta[start:]
+    if time.size < 4 * FEWEST_PERIODS:
+        return None
+    noise = float(np.median(np.abs(np.diff(theta, 2)))) if theta.size > 2 else 0.0
+    reach = float(np.quantile(np.abs(theta), 0.98))
+    least = max(2.5 * count, min(4 * noise, 0.3 * reach), 0.02 * reach)
+    half = swings(time, theta, least=least)
+    if half.peak.size < FEWEST_PERIODS + 2:
+        return None
+    size = np.abs(half.peak)
+    # The weighted mean of neighbours removes a small offset of the middle.
+    amplitude = (size[:-2] + 2 * size[1:-1] + size[2:]) / 4
+    period = half.period
+    steady = np.abs(period / np.median(period) - 1) < 0.6
+    inside = steady & (amplitude > 4 * least)
+    if np.count_nonzero(inside) >= FEWEST_PERIODS:
+        steady = inside
+    if np.count_nonzero(steady) < FEWEST_PERIODS:
+        return None
+    return Periods(amplitude[steady], period[steady])
+
+
+def share_of(periods: Periods, grown: Floats) -> tuple[float, float]:
+    """Return the increase of periods over a pendulum's, 1/k^2 for k times the angle; its error."""
+    columns = np.column_stack([np.ones(grown.size), grown - 1])
+    answer, spread = _robust_line(columns, periods.period)
+    return float(answer[1] / answer[0]), float(spread[1] / answer[0])
+
+
+def gain_of(time: Floats, theta: Floats, count: float) -> tuple[float, float] | None:
+    """Return the 95 % interval of reading over angle from the periods of a free run, or None."""
+    periods = periods_of(time, theta - (middle_of(time, theta) or 0.0), count)
+    if periods is None or float(np.max(periods.amplitude)) > LARGEST_SWING:
+        return None
+    share, error = share_of(periods, growth(periods.amplitude))
+    least, most = share - Z95 * error, share + Z95 * error
+    low = 1 / math.sqrt(most) if most > 0 else 0.0
+    return low, 1 / math.sqrt(least) if least > 0 else math.inf
+
+
+def middle_of(time: Floats, theta: Floats) -> float | None:
+    """Return the middle of the last quarter of a record, rad; None if it is short or rotates."""
+    late = theta[time >= time[0] + 0.75 * (time[-1] - time[0])]
+    if late.size < 20:
+        return None
+    low, high = (float(np.quantile(late, part)) for part in (0.02, 0.98))
+    return (low + high) / 2 if (high - low) / 2 < math.pi else None
+
+
+def factor_of(periods: Periods, share: float) -> tuple[float, float]:
+    """Return the factor on the readings that gives a pendulum's periods, and its error."""
+    best, error = math.sqrt(max(share, 1e-4)), 0.0
+    for _ in range(12):  # Gauss-Newton steps
+        grown = growth(best * periods.amplitude)
+        slope = (growth(1.001 * best * periods.amplitude) - grown) / (0.001 * best)
+        answer, spreads = _robust_line(np.column_stack([grown, slope]), periods.period)
+        step = float(np.clip(answer[1] / answer[0], -0.3 * best, 0.3 * best))
+        best, error = best + step, float(spreads[1] / answer[0])
+    return best, math.hypot(error, LEAST_ERROR * best)
+
+
+def growth(amplitude: Floats) -> Floats:
+    """Return T(A)/T0, computed by the arithmetic-geometric mean."""
+    a, b = np.ones_like(amplitude), np.abs(np.cos(amplitude / 2))
+    for _ in range(8):
+        a, b = (a + b) / 2, np.sqrt(a * b)
+    return np.asarray(1 / a)
+
+
+def _robust_line(columns: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Return coefficients and standard errors of a robust linear fit with Huber weights."""
+    weights = np.ones(values.size)
+    for _ in range(8):
+        root = np.sqrt(weights)[:, None]
+        answer = np.linalg.lstsq(columns * root, values * root[:, 0], rcond=None)[0]
+        away = np.abs(values - columns @ answer)
+        scale = max(normal_scale(away), 1e-12)
+        weights = np.minimum(1.0, 1.345 * scale / np.maximum(away, 1e-12))
+    inverse = np.linalg.pinv((columns * weights[:, None]).T @ columns)
+    return np.asarray(answer, float), scale * np.sqrt(np.diag(inverse))
+
+
 def seconds(work: Work) -> Finding | None:
     """Convert times in milliseconds, microseconds or nanoseconds to seconds."""
-    work.periods = _periods(work)
-    if work.periods is None or SHORTEST_PERIOD < (small := work.periods.small) < LONGEST_PERIOD:
+    periods = _periods(work)
+    if periods is None or SHORTEST_PERIOD < (small := periods.small) < LONGEST_PERIOD:
         return None
     for name, factor in SHORT_UNITS.items():
         if small <= LONGEST_PERIOD or not SHORTEST_PERIOD < small * factor < LONGEST_PERIOD:
             continue
         if "time" in work.declared:
             return work.finding("time-unit.declared", period=small, unit=name)
-        size = factor if work.integrated else 1.0
         finding = work.finding("time-unit.short", period=small, unit=name)
         work.time *= factor
-        work.theta *= size
-        work.periods = Periods(work.periods.amplitude * size, work.periods.period * factor)
+        work.theta *= factor if work.integrated else 1.0
         return finding
     return work.finding("time-unit.wrong", period=small)
 
@@ -76,7 +189,7 @@ def _periods(work: Work) -> Periods | None:
 
 def radians(work: Work) -> Finding | None:
     """Convert degrees to radians where the swings are impossible otherwise."""
-    periods = work.periods
+    periods = _periods(work)
     if periods is None or not _impossible(periods):
         return None
     largest = float(np.max(periods.amplitude))
@@ -87,7 +200,6 @@ def radians(work: Work) -> Finding | None:
         work.extra["velocity"] = work.extra["velocity"] * DEGREE
     work.count *= DEGREE
     work.estimated_step *= DEGREE
-    work.periods = Periods(periods.amplitude * DEGREE, periods.period)
     read = "velocities are degrees a second" if work.integrated else "angles are degrees"
     return work.finding("angle-unit.degrees", read=read, largest=largest)
 
@@ -104,7 +216,7 @@ def _channel(work: Work) -> str:
 
 def curvature(work: Work) -> Finding | None:
     """Report periods that do not increase with amplitude as a pendulum's do."""
-    periods = work.periods
+    periods = _periods(work)
     if periods is None or periods.period.size < FEWEST_PERIODS + 2:
         return None
     largest, grown = float(np.max(periods.amplitude)), growth(periods.amplitude)
@@ -113,7 +225,7 @@ def curvature(work: Work) -> Finding | None:
     share, error = share_of(periods, grown)
     if error >= 0.1 or abs(share - 1) <= 0.3 + 5 * error:
         return None
-    factor, spread = factor_of(periods)
+    factor, spread = factor_of(periods, share)
     return work.finding(
         "angle-unit.flat" if share < 0.1 else "angle-scale",
         low=periods.amplitude.min(),
@@ -128,7 +240,8 @@ def curvature(work: Work) -> Finding | None:
 
 def period_of_rig(work: Work) -> Finding | None:
     """Report a period of small swings that differs from that of [rig]."""
-    if work.periods is None:
+    periods = _periods(work)
+    if periods is None:
         return None
     expected = {}
     if "w0" in work.known:
@@ -136,7 +249,7 @@ def period_of_rig(work: Work) -> Finding | None:
     if "length_m" in work.known:
         root = math.sqrt(work.known["length_m"] / work.known.get("gravity", GRAVITY))
         expected[f"length_m = {work.known['length_m']:g} m"] = 2 * math.pi * root
-    seen = work.periods.smallest
+    seen = periods.smallest
     other = [
         f"{period:.4g} s by {name}"
         for name, period in expected.items()
@@ -150,10 +263,11 @@ def period_of_rig(work: Work) -> Finding | None:
 def sampling(work: Work) -> Finding | None:
     """Report a sampling rate too low for the motion."""
     interval = float(np.median(np.diff(work.time)))
-    number = work.periods.small / interval if work.periods else math.inf
+    periods = _periods(work)
+    number = periods.small / interval if periods else math.inf
     fastest = float(np.quantile(np.abs(np.diff(work.theta)), 0.99))
     if number < SAMPLES_A_PERIOD:
-        return work.finding("sampling-slow", number=number)
+        return work.finding("sampling-slow", number=number, column=work.columns.get("angle", "..."))
     return work.finding("sampling-slow.steps", step=fastest) if fastest > 1.0 else None
 
 

@@ -188,9 +188,4 @@ def noise_said(noise: NoiseFloor, unit: str = "rad") -> str:
     text = f"{noise.sigma:.3g} +- {noise.stderr:.1g} {unit} ({degrees})"
     if noise.limited_by_count:
         return f"{text}, that of rounding to counts: the record shows no less"
-    if noise.by_speed:
-        slow, fast = noise.by_speed[0], noise.by_speed[-1]
-        if fast.sigma > 1.2 * slow.sigma + 3 * (slow.stderr + fast.stderr):
-            what = "speed" if unit == "rad" else "acceleration"
-            text += f", {slow.sigma:.2g} at low and {fast.sigma:.2g} at high {what}"
     return text

@@ -16,9 +16,9 @@ import numpy as np
 from pendmap.errors import InputError
 from pendmap.files import read_whole
 from pendmap.formatting import counted, listed
-from pendmap.records.findings import finding_of
+from pendmap.records.experiment import finding_of
 from pendmap.records.units import CHANNELS
-from pendmap.records.workbooks import WORKBOOKS, sheet_text
+from pendmap.records.workbooks import WORKBOOK, sheet_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -65,6 +65,7 @@ _KNOWN: Final = {
     b"\x89HDF": "must be CSV or Parquet, it is an HDF5 file",
     b"CDF\x01": "must be CSV or Parquet, it is a NetCDF file",
     b"%PDF": "must be CSV or Parquet, it is a PDF file",
+    b"\xd0\xcf\x11\xe0": "must be .xlsx or CSV, it is an Excel file of an old version",
     b"MATLAB 5.0": "must be CSV or Parquet, it is a MATLAB file",
 }
 
@@ -404,7 +405,7 @@ def without_dates(lines: list[tuple[int, str]]) -> tuple[list[tuple[int, str]], 
 
 # Kinds of files: whether a file is of a kind, and what reads it
 READERS: Final[Sequence[tuple[Callable[[bytes, Path], bool], Callable[..., Table]]]] = (
-    (lambda data, _: data[:4] in WORKBOOKS, _workbook),
+    (lambda data, _: data[:4] == WORKBOOK, _workbook),
     (lambda data, path: data[:4] == b"PAR1" or path.suffix.lower() in _PARQUETS, _parquet),
     (lambda _, __: True, _text),
 )

@@ -10,7 +10,7 @@ import numpy as np
 
 from pendmap.errors import InputError
 from pendmap.formatting import counted, listed
-from pendmap.records.findings import finding_of
+from pendmap.records.experiment import finding_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
     from pendmap.records.description import RunPlan
     from pendmap.records.experiment import Finding, Segment
-    from pendmap.records.periods import Periods
     from pendmap.records.rod_sensors import Accelerometer
     from pendmap.signal import Floats, Indices, Mask, Stretch
 
@@ -60,15 +59,12 @@ class Work:
     accelerometer: Accelerometer | None = None
     integrated: bool = False  # the angle is the integral of the velocity
     place_missing: str = ""  # missing keys of [columns] on the accelerometer's position
-    doubt: Finding | None = None  # of a rule about its own correction
     moves: bool = False  # whether the pendulum moves
-    periods: Periods | None = None  # periods of a free record
     jumps: list[Jump] = dataclasses.field(default_factory=list)  # of the reading, not corrected
     bridged: Floats = dataclasses.field(default_factory=lambda: np.empty(0))  # without outliers
     parts: list[Stretch] = dataclasses.field(default_factory=list)  # free motions
     releases: list[Stretch] = dataclasses.field(default_factory=list)  # parts that are used
     edge: str | None = None  # edge of the trigger that is used
-    phase: float | None = None  # phase of the drive at that edge, rad
     edges: bool = False  # each reading is an edge of an encoder
     pivot_unit: str | None = None
     middle: float = 0.0  # middle of the swing, rad
@@ -101,7 +97,7 @@ class Work:
         span: tuple[float, float] | None = None,
         **values: object,
     ) -> Finding:
-        """Return a finding of :mod:`pendmap.records.findings`, at samples or over a span in s."""
+        """Return a finding of ``findings.toml``, at samples or over a span in s."""
         where = ""
         if at is not None and at.size:
             shown = listed([str(row) for row in self.rows[at[:4]]], 3)
@@ -110,6 +106,10 @@ class Work:
         if span is not None and not all(map(math.isfinite, span)):
             span = None
         return finding_of(key, where=where, span=span, **values)
+
+    def note(self, key: str, **values: Any) -> None:  # noqa: ANN401 (of any type)
+        """Note a further finding of a rule."""
+        self.findings.append(self.finding(key, **values))
 
     def keep(self, which: NDArray[Any]) -> None:
         """Keep the selected samples, in the given order."""

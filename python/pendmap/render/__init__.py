@@ -7,7 +7,6 @@ display is needed.
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
@@ -16,15 +15,15 @@ from pendmap.charts import registry
 from pendmap.charts.chart import Chart, Sheet
 from pendmap.errors import InputError
 from pendmap.render import drawing, style
+from pendmap.render.report import write_report
 from pendmap.render.style import SUFFIXES
 
 if TYPE_CHECKING:
     import os
+    from pathlib import Path
 
     from matplotlib.colors import Colormap
     from matplotlib.figure import Figure
-
-    from pendmap.diagnosis import Discrepancy
 
 __all__ = ["SUFFIXES", "draw", "figure_of", "write_report"]
 
@@ -83,15 +82,13 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
     path : str or path
         The file to write, ``.png``, ``.svg`` or ``.pdf``; an existing one is replaced.
     layer : str, optional
-        Part to draw alone, large: ``labels``, ``settle``, ``turns`` or ``exponent`` of a map,
-        over draws also ``probability`` and ``entropy``; ``history``, ``energy``, ``phase`` or
-        ``section`` of a trajectory; ``growth``, ``average`` or ``distribution`` of an exponent;
-        ``survival`` or ``tail`` of a lifetime; ``theta``, ``velocity`` or ``sweeps`` of a
-        bifurcation; of critical curves the plane: ``omega-p`` or ``e-alpha2``; of a map
-        ``kinds``, ``exponent``, ``attractors``, ``period``, ``winding``, ``undecided``, over draws
-        ``certainty``, or ``share KIND``; of a sweep ``fraction``, ``entropy``, ``uncertainty``,
-        over two parameters ``boundary`` and ``main``. An unknown one is answered with those of the
-        result.
+        Part to draw alone, large; an unknown one is answered with those of the result. Of a map
+        ``labels``, ``settle``, ``turns``, ``exponent``, ``probability``, ``entropy``; a trajectory
+        ``history``, ``energy``, ``phase``, ``section``; an exponent ``growth``, ``average``,
+        ``distribution``; a lifetime ``survival``, ``tail``; a diagram ``theta``, ``velocity``,
+        ``sweeps``; critical curves ``omega-p``, ``e-alpha2``; a map over parameters ``kinds``,
+        ``exponent``, ``attractors``, ``period``, ``winding``, ``undecided``, ``certainty``, ``share
+        KIND``; a sweep ``fraction``, ``entropy``, ``uncertainty``, ``boundary``, ``main``.
     size : (float, float), optional
         Width and height in inches, like ``8x4`` in a command; by default what the parts need.
     width : float, optional
@@ -129,38 +126,3 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
         return figure_of(result, layer=layer, dpi=dpi, **look)
 
     return style.written(path, make, dpi=dpi)
-
-
-def write_report(result: Discrepancy, path: str | os.PathLike[str]) -> Path:
-    """Write the report of a diagnosis with its figures.
-
-    Parameters
-    ----------
-    result : Discrepancy
-        Result of ``pendmap.diagnosis.diagnose``.
-    path : str or path
-        ``.html``: one file with the figures in it. ``.md``: Markdown, with the figures as ``.png``
-        beside it. Without a suffix: a folder with both, ``report.html`` and ``report.md``.
-
-    Returns
-    -------
-    Path
-        The file or folder. Each file is complete; existing ones are replaced.
-
-    Raises
-    ------
-    InputError
-        For an unknown suffix.
-    OSError
-        If a file cannot be written.
-    """
-    from pendmap.render import report  # noqa: PLC0415 (scipy takes a while)
-
-    target = Path(path)
-    if target.suffix.lower() not in {"", *report.SUFFIXES} and not target.is_dir():
-        known = " or ".join(report.SUFFIXES)
-        raise InputError(
-            f"cannot write {str(target)!r}: suffix must be {known}, or it must be a folder, got "
-            f"{target.suffix!r}"
-        )
-    return report.write(result, target)

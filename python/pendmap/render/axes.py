@@ -5,10 +5,9 @@ from __future__ import annotations
 import contextlib
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import is_color_like, to_hex
-from matplotlib.transforms import Bbox, BboxTransformFrom, BboxTransformTo, ScaledTranslation
+from matplotlib.transforms import ScaledTranslation
 
 from pendmap.charts import registry
 from pendmap.charts.chart import Chart
@@ -70,8 +69,8 @@ def plot(  # noqa: PLR0913 (all of these a user may choose)
     Returns
     -------
     matplotlib.axes.Axes
-        ``ax``, with marks, limits, ticks and labels. In a figure without a layout it is made
-        smaller where its texts would be cut off.
+        ``ax``, with marks, limits, ticks and labels. A figure without a layout gets the
+        ``constrained`` one of matplotlib.
 
     Raises
     ------
@@ -97,6 +96,9 @@ def plot(  # noqa: PLR0913 (all of these a user may choose)
 
             ax = plt.figure(layout="constrained").add_subplot()
         check_type("ax", ax, Axes, "plt.gca()")
+        figure: Any = ax.get_figure(root=True)
+        if figure.get_layout_engine() is None:
+            figure.set_layout_engine("constrained")
         with _growing(ax):
             drawing.panel_into(ax, panel)
         if isinstance(title, str):
@@ -104,10 +106,10 @@ def plot(  # noqa: PLR0913 (all of these a user may choose)
         elif title and panel.title and not ax.get_title():
             drawing.write_title(ax, style.typeset(panel.title))
         ticks.turn(ax)
-        _fit(ax)
         if legend is not False:
             _legend(ax, panel, always=bool(legend))
-        _fit(ax)
+        figure.get_layout_engine().execute(figure)
+        drawing.shrink(ax)
     return ax
 
 
@@ -127,12 +129,10 @@ def _panel(
     names: Mapping[str, str] | None,
 ) -> Panel:
     """Return one part of a result, by default the leading one."""
-    if layer is None:
-        layer = _FIRST.get(type(result).__name__)
-        if layer == "history" and len(getattr(result, "runs", [])) > 1:
-            layer = "0"
     # Alone a part has no names that the other parts explain.
-    layer = layer or registry.of_result(result).panels[0].name
+    known = [] if layer else [panel.name for panel in registry.of_result(result).panels]
+    first = _FIRST.get(type(result).__name__)
+    layer = layer or (first if first in known else known[0])
     chart = registry.of_result(result, layer=layer, colours=colours, names=names)
     if colormap is not None:
         chart = drawing.in_colours(chart, colormap)
@@ -141,67 +141,23 @@ def _panel(
 
 def _legend(axes: Axes, panel: Panel, *, always: bool) -> None:
     """Write the legend below the names of the axes, as wide as the axes."""
-    figure: Any = axes.figure
-    dpi = figure.get_figure(root=True).dpi
-    before = axes.get_legend()
-    texts = [text.get_text().replace("\n", " ") for text in before.get_texts()] if before else []
-    handles: list[Any] = before.legend_handles if before else []
-    named = dict(zip(texts, handles, strict=True)) | marks.legend(panel.marks)
+    figure: Any = axes.get_figure(root=True)
+    figure.get_layout_engine().execute(figure)
+    named, before = marks.legend(panel.marks), axes.get_legend()
+    if before is not None:
+        texts = [text.get_text().replace("\n", " ") for text in before.get_texts()]
+        named = dict(zip(texts, before.legend_handles, strict=True)) | named
     if not named:
         return
-    texts, columns = marks.shape([*named], axes.bbox.width / dpi)
+    texts, columns = marks.shape([*named], axes.bbox.width / figure.dpi)
     names = axes.xaxis.get_tightbbox()
-    down = (axes.bbox.y0 - names.y0 if names else 0.0) / dpi + 0.05
-    look: dict[str, Any] = marks.LEGEND
-    legend = axes.legend(
-        handles=[*named.values()],
-        labels=texts,
-        ncols=columns,
-        loc="upper left",
-        bbox_to_anchor=(0.0, 0.0),
-        bbox_transform=axes.transAxes + ScaledTranslation(0.0, -down, figure.dpi_scale_trans),
-        borderaxespad=0.0,
-        frameon=False,
-        **look,
-    )
+    below = (axes.bbox.y0 - names.y0 if names else 0.0) / figure.dpi + 0.05
+    down = ScaledTranslation(0.0, -below, figure.dpi_scale_trans)
+    look: dict[str, Any] = marks.LEGEND | {"ncols": columns, "loc": "upper left"}
+    look |= {"bbox_to_anchor": (0.0, 0.0), "bbox_transform": axes.transAxes + down}
+    legend = axes.legend([*named.values()], texts, borderaxespad=0.0, frameon=False, **look)
     if not always and legend.get_window_extent().height > axes.bbox.height / 2:
         legend.remove()
-
-
-def _fit(axes: Axes) -> None:
-    """Lay out a figure; without a layout make axes smaller whose texts leave their place."""
-    figure: Any = axes.get_figure(root=True)
-    if figure.get_layout_engine() is not None:
-        figure.get_layout_engine().execute(figure)
-        return
-    drawn = [*axes.images, *axes.collections]
-    group: list[Any] = [axes, *(one.colorbar.ax for one in drawn if one.colorbar)]
-    across = axes.figure.transSubfigure
-    boxes = [one.get_position(original=True).transformed(across) for one in group]
-    old, place = Bbox.union(boxes), np.asarray(_place(axes).extents)
-    box = Bbox.union([one.get_tightbbox() for one in group])
-    lack = np.maximum((place - box.extents) * (1, 1, -1, -1), 0.0) * (1, 1, -1, -1)
-    new = Bbox(np.reshape(old.extents + lack, (2, 2)))
-    if new.width > 0 and new.height > 0:
-        move = BboxTransformFrom(old) + BboxTransformTo(new)
-        for one, extent in zip(group, boxes, strict=True):
-            one.set_position(extent.transformed(move).transformed(across.inverted()))
-            one.set_in_layout(True)  # it is still moved by layouts of the user
-
-
-def _place(axes: Axes) -> Bbox:
-    """Return the figure, or the part of a grid up to the middle of the gaps around, in pixels."""
-    figure: Any = axes.figure
-    spec = axes.get_subplotspec()
-    if spec is None:
-        return Bbox(figure.bbox.get_points())
-    spec = spec.get_topmost_subplotspec()
-    low, high, left, right = spec.get_gridspec().get_grid_positions(figure)
-    across = np.concatenate([[0.0], (right[:-1] + left[1:]) / 2, [1.0]])
-    up = np.concatenate([[1.0], (low[:-1] + high[1:]) / 2, [0.0]])
-    rows, columns = spec.rowspan, spec.colspan
-    corners = [[across[columns.start], up[rows.stop]], [across[columns.stop], up[rows.start]]]
-    return Bbox(corners).transformed(figure.transSubfigure)
 
 
 @contextlib.contextmanager

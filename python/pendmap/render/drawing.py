@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-import warnings
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 import matplotlib as mpl
-import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
@@ -18,7 +16,7 @@ from pendmap.errors import InputError
 from pendmap.render import marks, style, ticks
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
 
     from matplotlib.axes import Axes
     from matplotlib.colors import Colormap
@@ -34,7 +32,7 @@ WIDE, ALONE, STACKED = 4.1, 5.2, 7.0
 BESIDE, BAR, BELOW, HEAD, ROW = 0.75, 0.75, 0.75, 0.7, 0.19
 """Inches for labels beside a panel, a colour bar, labels below, a title, a row of a legend."""
 LEFT: Final = 0.1  # Left margin of titles, inches
-LEAST: Final = (0.7, 0.15)  # Least width and height of a panel, inches
+SMALL: Final = 0.7  # Share of the usual size below which texts are smaller
 LETTERS: Final = "abcdefghijklmnopqrstuvwxyz"
 
 
@@ -48,28 +46,27 @@ def draw(
 ) -> Figure:
     """Return the figure of a chart or sheet, of any ``size`` or ``width`` in inches.
 
-    Where texts leave no room for the panels, they are smaller, in proportion to the figure.
+    Texts are smaller in a figure much smaller than usual.
     """
     if not title:
         chart = replace(chart, title="", subtitle="")
     if width is not None:
         chart = _in_width(chart, width)
     usual = _size(chart)
-    if not all(1 <= side * dpi <= style.PIXELS for side in size or usual):
-        raise InputError(
-            f"size {size or usual} at {dpi:g} dpi: sides must be 1 to {style.PIXELS} pixels"
-        )
-    figure = _made(chart, size or usual, dpi)
-    if not _fits(figure) and size is not None:
-        share = min(size[0] / usual[0], size[1] / usual[1], 1.0)
-        with mpl.rc_context(style.smaller(share)):
-            figure = _made(chart, size, dpi)
-            _fits(figure)
+    size = size or usual
+    if not all(1 <= side * dpi <= style.PIXELS for side in size):
+        raise InputError(f"size {size} at {dpi:g} dpi: sides must be 1 to {style.PIXELS} pixels")
+    share = min(size[0] / usual[0], size[1] / usual[1]) / SMALL
+    with mpl.rc_context(style.smaller(share) if share < 1 else {}):
+        figure = _made(chart, size, dpi)
+    for axes in figure.axes:
+        ticks.turn(axes)
+        shrink(axes)
     return figure
 
 
 def _made(chart: Chart | Sheet, size: Ends, dpi: float) -> Figure:
-    """Return the figure of a chart, not yet laid out."""
+    """Return the figure of a chart, laid out."""
     figure = Figure(size, dpi=dpi, layout="constrained")
     FigureCanvasAgg(figure)
     body: Any = figure.subfigures()
@@ -79,24 +76,15 @@ def _made(chart: Chart | Sheet, size: Ends, dpi: float) -> Figure:
     if isinstance(chart, Sheet):
         _fill_sheet(body, chart)
     else:
-        _foot(figure, chart.notes)
+        if chart.notes:
+            look: dict[str, Any] = {"fontsize": style.points("legend.fontsize"), "wrap": True}
+            text = style.typeset("\n".join(chart.notes))
+            figure.supxlabel(text, x=LEFT / _wide(figure), ha="left", **look)
         _fill(body, chart, iter(LETTERS if len(chart.panels) > 1 else ()))
         _legend(body, chart)
-    return figure
-
-
-def _fits(figure: Figure) -> bool:
-    """Lay out a figure; return whether its texts leave room for its panels."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with style.quiet():
         figure.draw_without_rendering()
-    for axes in figure.axes:
-        ticks.turn(axes)
-        if not axes.axison:
-            _shrink(axes)
-    panels = [axes for axes in figure.axes if axes.axison and axes.get_label() != "<colorbar>"]
-    small = any(np.any(axes.bbox.size < np.array(LEAST) * figure.dpi) for axes in panels)
-    return not small and not any("collapsed" in str(one.message) for one in caught)
+    return figure
 
 
 def _head(figure: FigureBase, text: str, **look: Any) -> None:  # noqa: ANN401 (of any text)
@@ -105,18 +93,10 @@ def _head(figure: FigureBase, text: str, **look: Any) -> None:  # noqa: ANN401 (
         figure.suptitle(style.typeset(text), x=LEFT / _wide(figure), ha="left", wrap=True, **look)
 
 
-def _foot(figure: Figure, notes: Sequence[str]) -> None:
-    """Write notes below a figure, each on lines of its own."""
-    if notes:
-        text = style.typeset("\n".join(notes))
-        size = style.points("legend.fontsize")
-        figure.supxlabel(text, x=LEFT / _wide(figure), ha="left", fontsize=size, wrap=True)
-
-
 def _in_width(chart: Chart | Sheet, width: float) -> Chart | Sheet:
     """Return a chart of a width in inches, a sheet with all its charts in one column."""
     if isinstance(chart, Sheet):
-        column: list[Any] = [_in_width(one, width) for some in chart.columns for one in some]
+        column: list[Any] = [_in_width(one, width) for one in chart.charts]
         return replace(chart, columns=[column])
     narrow = chart.in_width(width)
     return replace(narrow, size=(width, sum(narrow.heights) + _around(narrow, width)))
@@ -128,34 +108,25 @@ def _size(chart: Chart | Sheet) -> Ends:
         sizes = [[_size(one) for one in column] for column in chart.columns]
         across = sum(max(wide for wide, _ in column) for column in sizes)
         down = max(sum(high for _, high in column) for column in sizes)
-        return across, down + _head_of(chart) + (_rows(chart, across) if chart.legend else 0.0)
+        return across, down + _around(chart, across, legend=chart.legend)
     if chart.size is not None:
         return chart.size
     rows = chart.rows
     stacked = len(rows) > 1 and all(len(row) == 1 for row in rows)
     wide = STACKED if stacked else ALONE if len(rows[0]) == 1 else WIDE
-    width = max(len(row) * wide + _aside(row) for row in rows) + 0.15
+    bars = [sum(bool(_scales(panel)) for panel in row) for row in rows]
+    row_widths = [len(row) * (wide + BESIDE) + BAR * n for row, n in zip(rows, bars, strict=True)]
+    width = max(row_widths) + 0.15
     down = sum(chart.heights or [1.0] * len(rows)) * wide * chart.ratio
     return width, down + BELOW * len(rows) + _around(chart, width)
 
 
-def _around(chart: Chart, width: float) -> float:
-    """Return the height of title, legend and notes of a chart in inches."""
-    return _head_of(chart) + _rows(chart, width) + ROW * len(chart.notes)
-
-
-def _head_of(chart: Chart | Sheet) -> float:
-    return HEAD if chart.title else 0.05
-
-
-def _aside(row: Sequence[Panel]) -> float:
-    return BESIDE * len(row) + BAR * sum(bool(_scales(panel)) for panel in row)
-
-
-def _rows(chart: Chart | Sheet, width: float) -> float:
-    """Return the height of the legend of a chart in inches."""
+def _around(chart: Chart | Sheet, width: float, *, legend: bool = True) -> float:
+    """Return the height of title, legend and notes in inches."""
+    down = (HEAD if chart.title else 0.05) + ROW * len(getattr(chart, "notes", ()))
     texts, columns = marks.shape([*marks.legend(_all_marks(chart))], width)
-    return ROW * sum(text.count("\n") + 1 for text in texts[::columns]) + 0.1 if texts else 0.0
+    rows = sum(text.count("\n") + 1 for text in texts[::columns]) if legend else 0
+    return down + (ROW * rows + 0.1 if rows else 0.0)
 
 
 def _all_marks(chart: Chart | Sheet) -> list[Mark]:
@@ -207,10 +178,10 @@ def _fill_sheet(figure: FigureBase, sheet: Sheet) -> None:
 
 def _fill(figure: FigureBase, chart: Chart, letters: Iterator[str]) -> None:
     """Draw the panels of a chart into a figure or a part of it, with letters from ``letters``."""
-    count = chart.columns or math.lcm(*(len(row) for row in chart.rows))
+    count = math.lcm(*(len(row) for row in chart.rows))
     grid = figure.add_gridspec(len(chart.rows), count, height_ratios=chart.heights or None)
     for down, row in enumerate(chart.rows):
-        wide = 1 if chart.columns else count // len(row)
+        wide = count // len(row)
         for k, panel in enumerate(row):
             axes = figure.add_subplot(grid[down, k * wide : (k + 1) * wide])
             panel_into(axes, panel)
@@ -262,9 +233,9 @@ def _warn(axes: Axes, warning: str) -> None:
     words.set_in_layout(False)
 
 
-def _shrink(axes: Axes) -> None:
+def shrink(axes: Axes) -> None:
     """Make words of a panel without a frame so small that they fit in its width."""
-    for text in axes.texts:
+    for text in () if axes.axison else axes.texts:
         share = axes.bbox.width / max(text.get_window_extent().width, 1.0)
         text.set_fontsize(float(text.get_fontsize()) * min(share, 1.0))
 

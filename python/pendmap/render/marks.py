@@ -242,6 +242,4 @@ def _handle(mark: Mark) -> Any:  # noqa: ANN401 (an artist)
         return Line2D([], [], color=mark.colour, lw=mark.width, ls=_dash(mark.dash))
     if isinstance(mark, charts.Areas) and mark.hatch:
         return Patch(facecolor="none", edgecolor=mark.colour, hatch=mark.hatch, lw=0)
-    if isinstance(mark, charts.Steps) and not mark.filled:
-        return Line2D([], [], color=mark.colour, lw=mark.width)
     return Patch(facecolor=mark.colour, alpha=mark.alpha, lw=0)

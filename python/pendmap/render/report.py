@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import contextlib
 import io
+from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import matplotlib as mpl
 
-from pendmap import report
-from pendmap.charts import diagnosis
+from pendmap.errors import InputError
 from pendmap.files import whole_file, whole_folder
 from pendmap.render import drawing, style
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
+    import os
 
     from matplotlib.figure import Figure
 
@@ -28,46 +27,66 @@ DPI: Final = 110.0  # Pixels per inch: sharp on a screen, with a file below a me
 
 def figures(result: Discrepancy) -> dict[str, Figure]:
     """Return the figures under the names that the report uses."""
-    made = {n: drawing.draw(chart, dpi=DPI) for n, chart in diagnosis.parts(result).items()}
-    cycles = diagnosis.cycles(result)
-    return made | ({} if cycles is None else {"figure_7": drawing.draw(cycles, dpi=DPI)})
+    from pendmap.charts import diagnosis  # noqa: PLC0415 (scipy takes a while)
+
+    return {n: drawing.draw(chart, dpi=DPI) for n, chart in diagnosis.parts(result).items()}
 
 
-def write(result: Discrepancy, path: Path) -> Path:
-    """Write the report of a diagnosis; see :func:`pendmap.render.write_report`."""
+def write_report(result: Discrepancy, path: str | os.PathLike[str]) -> Path:
+    """Write the report of a diagnosis with its figures.
+
+    Parameters
+    ----------
+    result : Discrepancy
+        Result of ``pendmap.diagnosis.diagnose``.
+    path : str or path
+        ``.html``: one file with the figures in it. ``.md``: Markdown, with the figures as ``.png``
+        beside it. Without a suffix: a folder with both, ``report.html`` and ``report.md``.
+
+    Returns
+    -------
+    Path
+        The file or folder. Each file is complete; existing ones are replaced.
+
+    Raises
+    ------
+    InputError
+        For an unknown suffix.
+    OSError
+        If a file cannot be written.
+    """
+    from pendmap import report  # noqa: PLC0415 (likewise)
+
+    target = Path(path)
+    suffix = "" if target.is_dir() else target.suffix.lower()
+    if suffix not in {"", *SUFFIXES}:
+        raise InputError(
+            f"cannot write {str(target)!r}: suffix must be {' or '.join(SUFFIXES)}, or it must be "
+            f"a folder, got {target.suffix!r}"
+        )
+    pictures: dict[str, bytes] = {}
     with style.DRAWING, mpl.rc_context(style.RC):
-        pictures = {name: _png(drawn) for name, drawn in figures(result).items()}
-    suffix = "" if path.is_dir() else path.suffix.lower()
-    if suffix == ".html":
-        _put({path: report.as_html(result, pictures).encode()})
-    elif suffix == ".md":
-        _put(_markdown(path, result, pictures, f"{path.stem}_"))
-    else:
-        with contextlib.nullcontext(path) if path.is_dir() else whole_folder(path) as folder:
-            folder.mkdir(exist_ok=True)
-            files = _markdown(folder / "report.md", result, pictures)
-            files[folder / "report.html"] = report.as_html(result, pictures).encode()
-            _put(files)
-    return path
-
-
-def _put(files: Mapping[Path, bytes]) -> None:
-    """Write the files of a report: all of them, or none."""
-    with contextlib.ExitStack() as places:
-        for path, content in files.items():
-            places.enter_context(whole_file(path, (*SUFFIXES, ".png"))).write_bytes(content)
-
-
-def _png(made: Figure) -> bytes:
-    buffer = io.BytesIO()
-    made.savefig(buffer, format="png", dpi=DPI)
-    return buffer.getvalue()
-
-
-def _markdown(
-    path: Path, result: Discrepancy, pictures: dict[str, bytes], prefix: str = ""
-) -> dict[Path, bytes]:
-    """Return a Markdown file and its figures, whose names begin with a prefix."""
-    names = {name: f"{prefix}{name}.png" for name in pictures}
-    files = {path.with_name(names[name]): content for name, content in pictures.items()}
-    return files | {path: report.as_markdown(result, names).encode()}
+        for name, figure in figures(result).items():
+            buffer = io.BytesIO()
+            figure.savefig(buffer, format="png", dpi=DPI)
+            pictures[name] = buffer.getvalue()
+    folder = contextlib.nullcontext(target.parent if suffix else target)
+    with folder if suffix or target.is_dir() else whole_folder(target) as place:
+        if not suffix:
+            place.mkdir(exist_ok=True)
+        files = {}
+        if suffix != ".html":
+            prefix = f"{target.stem}_" if suffix else ""
+            names = {name: f"{prefix}{name}.png" for name in pictures}
+            files = {names[name]: content for name, content in pictures.items()}
+            page = report.as_markdown(result, names).encode()
+            files[target.name if suffix else "report.md"] = page
+        if suffix != ".md":
+            page = report.as_html(result, pictures).encode()
+            files[target.name if suffix else "report.html"] = page
+        # All of them, or none.
+        with contextlib.ExitStack() as places:
+            for name, content in files.items():
+                part = places.enter_context(whole_file(place / name, (*SUFFIXES, ".png")))
+                part.write_bytes(content)
+    return target

@@ -38,13 +38,9 @@ IN_COLUMN: Final[dict[Any, Any]] = {
     "ytick.labelsize": 7.5,
     "legend.fontsize": 7.5,
 }
-
 PIXELS = 20000  # Largest side of a figure, pixels
 FEWEST = 12  # Letters of a line that is not broken
-
 DPI = (20, 1200)  # Least and greatest pixels per inch
-
-
 DRAWING: Final = threading.RLock()
 """Held while a figure is made, drawn or written: matplotlib and its settings have no threads."""
 

@@ -127,7 +127,9 @@ def estimate_noise(
     variance of each run's noise.
     """
     spectra = residual_spectra(fit, runs)
-    if not spectra.quick_sizes.any() or spectra.mean < ARITHMETIC:
+    size = spectra.slow_sizes.sum() + spectra.quick_sizes.sum()
+    power = spectra.slow.sum() + spectra.quick.sum()
+    if not spectra.quick_sizes.any() or power < ARITHMETIC * size:
         none, known = (0.0,) * len(runs), np.ones((2, 1))
         return ResidualNoise(1.0, 0.0, 0.0, none, 1.0, known, CERTAIN, spectra.independent)
     laws = noise_laws(spectra.quick, spectra.quick_sizes, np.asarray(floors, np.float64))
@@ -219,12 +221,6 @@ class Spectra:
     motion: Floats
     states: Floats  # Number of fitted initial states, shape (runs,)
     independent: float  # Effective number of readings, as in ResidualNoise
-
-    @property
-    def mean(self) -> float:
-        """Mean squared amplitude."""
-        sizes = self.slow_sizes.sum() + self.quick_sizes.sum()
-        return float((self.slow.sum() + self.quick.sum()) / sizes)
 
 
 def residual_spectra(fit: TrajectoryFit, runs: Sequence[FitRun]) -> Spectra:

@@ -59,17 +59,14 @@ LOST: Final = 1e-6  # ``W`` over its greatest below which the integrand is set t
 class Torque:
     """Residual torque of a model, in bins of each quantity."""
 
-    # Rows of bins by quantity: ``from`` and ``to``, ``torque`` and ``stderr`` in rad/s^2, their
-    # ratio ``z``, and whether it is along the motion. Empty if the records have no such quantity.
-    rows: dict[str, list[dict[str, Any]]]
-    # Decrease of the sum of squares with a quantity's torques, and number of combinations of bins.
-    gains: dict[str, tuple[float, int]]
     noise: ResidualNoise  # Noise of the model's residuals
-
-    @classmethod
-    def unknown(cls, noise: ResidualNoise) -> Torque:
-        """Return the empty result for a model whose residual torque cannot be computed."""
-        return cls({name: [] for name in OVER}, {}, noise)
+    # Rows of bins by quantity: ``from`` and ``to``, ``torque`` and ``stderr`` in rad/s^2, their
+    # ratio ``z``, and whether it is along the motion. Empty if the quantity is not in the records.
+    rows: dict[str, list[dict[str, Any]]] = dataclasses.field(
+        default_factory=lambda: {name: [] for name in OVER}
+    )
+    # Decrease of the sum of squares with a quantity's torques, and number of combinations of bins.
+    gains: dict[str, tuple[float, int]] = dataclasses.field(default_factory=dict)
 
     @property
     def chance(self) -> float:
@@ -121,7 +118,7 @@ def residual_torque(runs: Sequence[FitRun], fit: TrajectoryFit, noise: ResidualN
             for low, high, torque, error in np.stack(columns_of, axis=1).tolist()
         ]
         first = part.stop
-    return Torque(rows, gains, noise)
+    return Torque(noise, rows, gains)
 
 
 def window_derivatives(

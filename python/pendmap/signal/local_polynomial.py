@@ -12,8 +12,9 @@ import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from numpy.polynomial import Polynomial
 
-from pendmap.signal.robust import NORMAL_MAD
+from pendmap.signal.robust import NORMAL_MAD, widened
 
 if TYPE_CHECKING:
     from pendmap.signal import Floats, Indices, Mask
@@ -22,10 +23,9 @@ if TYPE_CHECKING:
 POINTS: Final = 9  # Number of samples in a window
 _DEGREE: Final = 4  # Degree of the polynomials that give a velocity
 _EVEN: Final = 1e-3  # Offset from even spacing, in intervals, above which a window is uneven
-_BLOCK: Final = 20_000  # Number of uneven windows solved at a time
+_BLOCK: Final = 4096  # Number of uneven windows solved at a time
 _OUTLIER: Final = 4.5  # Size of a residual from which it is left out, standard deviations
 _ROUNDS: Final = 4  # Largest number of repetitions of a fit without outliers
-_WINDOW_BLOCK: Final = 4096  # Number of windows of uneven samples solved at a time
 
 
 @dataclasses.dataclass(frozen=True)
@@ -144,54 +144,21 @@ class WindowFit:
 
     def at(self, time: float, derivative: int = 0) -> tuple[float, float]:
         """Return a derivative and its standard error for unit noise, in rad/s^derivative."""
-        size = self.coefficients.size
-        row = np.zeros(size)
         s = (time - self.centre) / self.half
-        for j in range(derivative, size):
-            row[j] = math.perm(j, derivative) * s ** (j - derivative) / self.half**derivative
-        return float(row @ self.coefficients), math.sqrt(
-            max(float(row @ self.covariance @ row), 0.0)
-        )
+        powers = np.maximum(np.arange(self.coefficients.size) - derivative, 0)
+        factors = [math.perm(j, derivative) for j in range(self.coefficients.size)]
+        row = np.array(factors) * s**powers / self.half**derivative
+        variance = max(float(row @ self.covariance @ row), 0.0)
+        return float(row @ self.coefficients), math.sqrt(variance)
 
-    def turn(self) -> float | None:
-        """Return the instant nearest to the centre at which the velocity is zero, s."""
-        slopes = self.coefficients[1:] * np.arange(1, self.coefficients.size)
-        return self._nearest_root(slopes)
-
-    def zero(self) -> float | None:
-        """Return the instant nearest to the centre at which the angle is zero, s."""
-        return self._nearest_root(self.coefficients)
-
-    def _nearest_root(self, ascending: Floats) -> float | None:
-        # Newton's method from the middle nearly always converges and is faster than all roots.
-        root = _newton(ascending.tolist())
-        if root is None:
-            roots = np.roots(ascending[::-1])
-            real = roots[np.abs(roots.imag) < 1e-9 * (1 + np.abs(roots.real))].real
-            real = real[np.abs(real) < 1]
-            if real.size == 0:
-                return None
-            root = float(real[np.argmin(np.abs(real))])
-        return self.centre + self.half * root
-
-
-def _newton(ascending: list[float]) -> float | None:
-    """Return a root within half a unit of 0 by Newton's method, or None."""
-    s = 0.0
-    for _ in range(20):
-        value = slope = 0.0
-        for c in reversed(ascending):
-            slope = slope * s + value
-            value = value * s + c
-        if slope == 0:
+    def root(self, derivative: int = 0) -> float | None:
+        """Return the instant nearest to the centre at which a derivative is zero, s."""
+        roots = Polynomial(self.coefficients).deriv(derivative).roots()
+        real = roots[np.abs(roots.imag) < 1e-9 * (1 + np.abs(roots.real))].real
+        real = real[np.abs(real) < 1]
+        if real.size == 0:
             return None
-        step = value / slope
-        s -= step
-        if abs(s) > 0.5:  # noqa: PLR2004
-            return None
-        if abs(step) < 1e-13:  # noqa: PLR2004
-            return s
-    return None
+        return self.centre + self.half * float(real[np.argmin(np.abs(real))])
 
 
 def fit_around(  # noqa: PLR0913 (samples, window, form)
@@ -260,23 +227,14 @@ def smoothed_velocity(time: Floats, theta: Floats, half: float) -> tuple[Floats,
     inside = slice(reach, time.size - reach)
     slope[inside] = np.correlate(theta, rows @ normal[1], "valid") / scale
     stderr[inside] = math.sqrt(normal[1, 1]) / scale
-    odd = np.flatnonzero(~_evenly(time, step, reach))
-    for begin in range(0, odd.size, _WINDOW_BLOCK):
-        some = odd[begin : begin + _WINDOW_BLOCK]
+    apart = np.append(np.abs(np.diff(time) / step - 1.0) > _EVEN, False)
+    uneven = widened(apart, reach)
+    uneven[:reach] = uneven[-reach:] = True
+    odd = np.flatnonzero(uneven)
+    for begin in range(0, odd.size, _BLOCK):
+        some = odd[begin : begin + _BLOCK]
         slope[some], stderr[some] = _slopes(time, theta, some, width, scale)
     return slope, stderr
-
-
-def _evenly(time: Floats, step: float, reach: int) -> Mask:
-    """Return whether the window of ``reach`` samples to each side is even, for each sample."""
-    even = np.zeros(time.size, bool)
-    # The limit holds for each interval of a window and, times the root of their number, the sum.
-    off = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(time) / step - 1.0) > _EVEN)))
-    drift = np.abs(time[2 * reach :] - time[: time.size - 2 * reach] - 2 * reach * step)
-    even[reach : time.size - reach] = (off[2 * reach :] == off[: time.size - 2 * reach]) & (
-        drift < _EVEN * step * math.sqrt(2 * reach)
-    )
-    return even
 
 
 def _slopes(

@@ -17,7 +17,7 @@ from pendmap.charts import registry
 from pendmap.errors import InputError, MissingExtraError, ViewerError, short_repr
 
 try:
-    from pendmap.viewer import datasets, recording
+    from pendmap.viewer import chart, recording
     from pendmap.viewer.live import ADDRESS, Live, NobodyListensError, check_address
     from pendmap.viewer.recording import SUFFIXES
     from pendmap.viewer.window import (
@@ -68,7 +68,7 @@ def record(
     ``/run_1/pendulum/data``; a diagnosis has the models ``before`` and ``after``.
     """
     if isinstance(result, xr.Dataset):
-        made = datasets.contents(registry.ready(result, "record"))
+        made = chart.contents(registry.ready(result, "record"))
     elif type(result).__name__ in registry.RESULTS:
         from pendmap.viewer import runs  # noqa: PLC0415 (importing fits takes half a second)
 

@@ -1,28 +1,34 @@
-"""Any chart as a recording: its panels, their marks, and a legend in words."""
+"""Recordings of charts and of datasets: panels, their marks, a legend in words, layouts."""
 
 from __future__ import annotations
 
-import itertools
+import functools
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
+import numpy as np
 import rerun.blueprint as rrb
 
+from pendmap.analysis.sweep_table import varied_names
+from pendmap.charts import basin_sweep, palette, registry
 from pendmap.charts import marks as charts
-from pendmap.charts import palette
 from pendmap.charts.chart import Sheet
-from pendmap.viewer import marks, recording
-from pendmap.viewer.place import Place, plain
+from pendmap.files import facts
+from pendmap.viewer import marks, recording, trajectory
+from pendmap.viewer.marks import Place, plain
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     import rerun as rr
+    import xarray as xr
 
     from pendmap.charts.chart import Chart
     from pendmap.charts.marks import Mark
 
+MODELS: Final = "map"  # Timeline of a sweep over two parameters: models row by row
+_OF_A_RUN: Final = ("seconds", "summary", "history")  # Facts that differ between equal results
 CELLS: Final = 4096
 """Most rows and columns of an image; not all graphics processors take larger ones."""
 FEW: Final = 3  # Number of views up to which they stand below one another
@@ -59,13 +65,13 @@ class Drawing:
                 yield from (f"**{plain(place.panel.warning)}**", "")
             names |= marks.legend(place.panel.marks)
         yield from (f"- {plain(name)}: {palette.in_words(shade)}" for name, shade in names.items())
-        yield from (f"\n{plain(note)}" for note in (*chart.notes, chart.remark) if note)
+        yield from (f"\n{plain(note)}" for note in chart.notes)
 
 
 def drawings(shown: Chart | Sheet) -> list[Drawing]:
     """Return the charts of a figure; those of a sheet have numbered paths."""
     sheet = isinstance(shown, Sheet)
-    every = list(itertools.chain(*shown.columns)) if isinstance(shown, Sheet) else [shown]
+    every = shown.charts if isinstance(shown, Sheet) else [shown]
     made = []
     for number, chart in enumerate(every, 1):
         places: dict[str, Place] = {}
@@ -100,3 +106,64 @@ def _document(every: Sequence[Mark]) -> Iterator[str]:
             yield from (f"| {' | '.join(cells)} |" for cells in lines)
         elif isinstance(mark, charts.Text):
             yield from ("", plain(mark.text))
+
+
+def contents(dataset: xr.Dataset) -> dict[str, Any]:
+    """Return layout, contents and name of the recording of a dataset."""
+    attrs, kind = dataset.attrs, dataset.attrs["kind"]
+    known = {str(k): v for k, v in facts(dataset).items() if k not in _OF_A_RUN}
+    arrays = (v.values for k, v in sorted(dataset.variables.items()) if v.ndim)
+    made: dict[str, Any] = {
+        "name": ": ".join(str(attrs[key]) for key in ("kind", "title") if key in attrs),
+        "content": recording.content_of([sorted(known.items()), *arrays]),
+        # A property has one type in all recordings of a process.
+        "known": {
+            k: v if isinstance(v, str) else float(v) for k, v in known.items() if np.ndim(v) == 0
+        },
+    }
+    if kind == "trajectory":
+        around = trajectory.places(known, dataset["velocity"].values)
+        layout = trajectory.layout(known, around)
+        return made | {"layout": layout, "log": functools.partial(trajectory.log, dataset=dataset)}
+    drawn = drawings(registry.build(dataset, cells=CELLS))
+    front: list[rrb.View | rrb.Container] = [drawn[0].container]
+    line = recording.TIMELINE
+    if kind == "basin_sweep":
+        _, panel, ratio = next(basin_sweep.models(dataset, CELLS))
+        front, dims = [Place.of(panel, ratio).view(), *front], varied_names(dataset)
+        line = dims[0] if len(dims) == 1 else MODELS
+
+    def write(stream: rr.RecordingStream) -> None:
+        lines = str(attrs.get("summary", "")).splitlines()
+        log(stream, drawn, "\n\n".join(lines))
+        if kind == "basin_sweep":
+            _log_models(stream, dataset, line, drawn[0].places)
+
+    shares = [*([6] * len(front)), 5]
+    return made | {
+        "layout": recording.screen(*front, ASIDE, shares=shares, timeline=line),
+        "log": write,
+    }
+
+
+def _log_models(
+    stream: rr.RecordingStream, dataset: xr.Dataset, line: str, others: Sequence[Place]
+) -> None:
+    """Log the basins of each model of a sweep on the timeline of its parameter.
+
+    The value of one parameter is in seconds, and a line in the other panels.
+    """
+    for number, (at, panel, ratio) in enumerate(basin_sweep.models(dataset, CELLS)):
+        place = Place.of(panel, ratio)
+        if number == 0:
+            place.log_frame(stream)
+        if line == MODELS:
+            stream.set_time(line, sequence=number)
+        else:
+            stream.set_time(line, duration=at[0][1])
+            now = charts.Level(at[0][1], axis="x", path="now")
+            for other in others:
+                marks.log(stream, other, now, 0, static=False)
+        for order, mark in enumerate(panel.marks):
+            marks.log(stream, place, mark, order, static=False)
+    stream.reset_time()

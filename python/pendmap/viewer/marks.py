@@ -1,32 +1,192 @@
-"""Marks of charts as components of a recording."""
+"""Panels of charts in 2D views: frame, ticks and units, and marks as components of a recording."""
 
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import rerun as rr
+import rerun.blueprint as rrb
 
 from pendmap.charts import marks as charts
 from pendmap.charts import palette, plane
+from pendmap.charts.chart import holding
 from pendmap.formatting import typographic
 from pendmap.viewer import recording
-from pendmap.viewer.place import SIDE, Place, plain
 from pendmap.viewer.recording import INK
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     import numpy.typing as npt
 
-    from pendmap.charts.marks import Floats, Mark
+    from pendmap.charts.chart import Axis, Panel
+    from pendmap.charts.marks import Ends, Floats, Mark
 
-    Part = tuple[str, Any, bool]  # leaf of the path, components, whether always static
-
+SIDE: Final = 1000.0  # Width of a frame, units of the view
+SHORT: Final = 8  # Greatest number of letters of an axis name beside the ticks
+_POWER: Final = re.compile(r"\$(-?)10\^\{(-?\d+)\}\$")
 PALE: Final = (charts.INK, charts.QUIET)  # Colours that are invisible on a dark background
-IMAGES, AREAS, LINES, POINTS = 0.0, 10.0, 20.0, 30.0  # Drawing order, the lowest first
+AREAS, LINES, POINTS = 10.0, 20.0, 30.0  # Drawing order above images, the lowest first
+THIN: Final = 0.7  # Width of the outline of an area
 BYTE, CLASSES = 256, 20_000  # Classes that one byte holds; most values of an image of numbers
+
+
+def plain(text: str) -> str:
+    """Return a text of a chart in one line, without mathtext."""
+    return _POWER.sub(r"\g<1>10^\2", text).replace("\n", " ").strip()
+
+
+def scaled(axis: Axis, values: npt.ArrayLike) -> Floats:
+    """Return values as a linear axis shows them: powers of ten of a logarithmic one."""
+    x: Floats = np.asarray(values, dtype=float)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        if axis.scale == "log":
+            x = np.log10(x)
+        elif axis.scale == "signed":
+            part = x / axis.straight
+            beyond = np.sign(part) * (1.0 + np.log10(np.abs(part)))
+            x = np.where(np.abs(part) > 1.0, beyond, part)
+    return x
+
+
+def unscaled(axis: Axis, values: npt.ArrayLike) -> Floats:
+    """Return values of an axis from those that a linear axis shows."""
+    x: Floats = np.asarray(values, dtype=float)
+    if axis.scale == "log":
+        x = 10.0**x
+    elif axis.scale == "signed":
+        beyond = np.sign(x) * 10.0 ** (np.abs(x) - 1.0)
+        x = axis.straight * np.where(np.abs(x) > 1.0, beyond, x)
+    return x
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Position of a panel in a recording and in its view.
+
+    A 2D view has y downward, linear axes and one scale for both. So all under ``root/data`` is
+    logged in the units of linear axes, one static transform maps it to the screen, and the frame
+    with its ticks is drawn under ``root/axes``, ``SIDE`` wide and ``height`` high.
+    """
+
+    panel: Panel
+    root: str
+    height: float
+    x: Ends
+    y: Ends
+
+    @classmethod
+    def of(cls, panel: Panel, ratio: float, root: str = "") -> Place:
+        """Return the place of a panel with this ratio of height to width."""
+        return cls(panel, root or panel.where, SIDE * ratio, _ends(panel, "x"), _ends(panel, "y"))
+
+    @property
+    def title(self) -> str:
+        """Title of the view."""
+        text = plain(self.panel.title or self.panel.name)
+        return text[:1].upper() + text[1:]
+
+    def points(self, x: npt.ArrayLike, y: npt.ArrayLike) -> Floats:
+        """Return points, shape (n, 2), in the units of linear axes."""
+        both = scaled(self.panel.x, x), scaled(self.panel.y, y)
+        return np.stack(np.broadcast_arrays(*both), axis=-1)
+
+    def inside(self, points: Floats) -> npt.NDArray[np.bool_]:
+        """Return which points lie within the frame, because a view does not clip."""
+        low, high = np.sort([self.x, self.y]).T
+        slack = 1e-9 * (high - low)
+        there = (low - slack <= points) & (points <= high + slack)
+        return np.asarray(there.all(axis=1), dtype=bool)
+
+    def lines(self, *lines: Floats) -> list[Floats]:
+        """Return the parts of lines within the frame, each of two or more points."""
+        parts: list[Floats] = []
+        for line in lines:
+            there = self.inside(line)
+            cuts = np.flatnonzero(np.diff(there.astype(np.int8))) + 1
+            pieces = zip(np.split(line, cuts), np.split(there, cuts), strict=True)
+            parts += [part for part, seen in pieces if len(part) > 1 and seen.all()]
+        return parts
+
+    def across(self, axis: str, value: float) -> Floats:
+        """Return the line across the frame at a value of an axis."""
+        at = self.points(value, 1.0) if axis == "x" else self.points(1.0, value)
+        ends = np.repeat(at[None], 2, axis=0)
+        ends[:, int(axis == "x")] = self.y if axis == "x" else self.x
+        return ends
+
+    def of_pixels(self, shape: tuple[int, ...], x: Ends, y: Ends) -> rr.Transform3D:
+        """Return the transform from an image's pixels, row 0 lowest, to the axes' units."""
+        (left, low), (right, high) = self.points(x, y)
+        scale = np.diag([(right - left) / shape[1], (high - low) / shape[0], 1.0])
+        return rr.Transform3D(translation=[left, low, 0.0], mat3x3=scale)
+
+    def view(self, time_ranges: Sequence[rrb.VisibleTimeRange] | None = None) -> rrb.View:
+        """Return the view of this panel, with room for ticks and a colour bar."""
+        origin = f"/{self.root}"
+        if self.panel.bare:
+            return rrb.TextDocumentView(origin=origin, name=self.title)
+        bounds = rrb.VisualBounds2D(
+            x_range=[-210.0, SIDE + 190.0], y_range=[-110.0, self.height + 150.0]
+        )
+        return rrb.Spatial2DView(
+            origin=origin, name=self.title, visual_bounds=bounds, time_ranges=time_ranges
+        )
+
+    def log_frame(self, stream: rr.RecordingStream) -> None:
+        """Log the transform, the frame, its ticks and the names of its axes."""
+        w, h = SIDE, self.height
+        sx, sy = w / (self.x[1] - self.x[0]), h / (self.y[1] - self.y[0])
+        to_screen = rr.Transform3D(
+            translation=[-sx * self.x[0], sy * self.y[1], 0.0], mat3x3=np.diag([sx, -sy, 1.0])
+        )
+        stream.log(f"{self.root}/data", to_screen, static=True)
+        below, along = _ticks(self.panel.x, self.x)
+        beside, up = _ticks(self.panel.y, self.y)
+        columns = [(sx * (at - self.x[0]), text) for at, text in along]
+        rows = [(sy * (self.y[1] - at), text) for at, text in up]
+        lines: list[list[list[float]]] = [[[0, 0], [w, 0], [w, h], [0, h], [0, 0]]]
+        lines += [[[at, h], [at, h + 12]] for at, _ in columns]
+        lines += [[[-12, at], [0, at]] for at, _ in rows]
+        thin = rr.LineStrips2D(lines, colors=[INK], radii=rr.Radius.ui_points(0.75))
+        stream.log(f"{self.root}/axes/frame", thin, static=True)
+        places = [[at, h + 20] for at, _ in columns] + [[-70, at - 22] for at, _ in rows]
+        # A long name does not fit beside the ticks.
+        places += [[w / 2, h + 75], [0, -85] if len(beside) > SHORT else [-135, h / 2 - 22]]
+        texts = [*(text for _, text in [*columns, *rows]), below, beside]
+        stream.log(f"{self.root}/axes/ticks", recording.labels(places, texts), static=True)
+
+
+def _ends(panel: Panel, which: str) -> Ends:
+    """Return the limits of an axis; those of its marks if it has none."""
+    axis: Axis = getattr(panel, which)
+    if axis.ends is not None and axis.ends[0] != axis.ends[1]:
+        low, high = (float(end) for end in scaled(axis, axis.ends))
+        return low, high
+    every = [axis.ends] if axis.ends else [_values(mark, which) for mark in panel.marks]
+    return holding(*(scaled(axis, some) for some in every))
+
+
+def _ticks(axis: Axis, ends: Ends) -> tuple[str, list[tuple[float, str]]]:
+    """Return the name of an axis and its ticks, in the units of a linear axis."""
+    low, high = sorted(unscaled(axis, ends).tolist())
+    name, ticks = plane.ticks(axis, low, high)
+    return plain(name), [(float(scaled(axis, at)), plain(text)) for at, text in ticks]
+
+
+def _values(mark: Mark, which: str) -> Floats:
+    """Return the coordinates of a mark that an axis must contain."""
+    arrays: list[npt.ArrayLike] = []
+    if isinstance(mark, charts.Band):
+        arrays = [mark.x] if which == "x" else [mark.low, mark.high]
+    elif isinstance(mark, charts.Steps):
+        arrays = [mark.edges] if which == "x" else [mark.values, 0.0]
+    elif isinstance(mark, charts.Line | charts.Points | charts.Image):
+        arrays = [getattr(mark, which)]
+    return np.concatenate([np.empty(0), *(np.ravel(array) for array in arrays)])
 
 
 def log(
@@ -36,10 +196,23 @@ def log(
     leaf = re.sub(r"\W+", "_", f"{number}_{mark.name}").strip("_")
     path = f"{place.root}/data/{mark.path or leaf}"
     order = 0.01 * number if mark.order is None else mark.order
-    for end, part, still in _PARTS[type(mark)](mark, place, order):
-        stream.log(f"{path}{end}", part, static=static or still)
-    if isinstance(mark, charts.Image) and mark.colours is not None:
-        _log_bar(stream, place, mark.colours)
+    if isinstance(mark, charts.Image):
+        _log_image(stream, place, mark, path, static=static)
+    elif isinstance(mark, charts.Points):
+        for leaf, points in _points(mark, place, POINTS + order):
+            stream.log(f"{path}{leaf}", points, static=static)
+    elif isinstance(mark, charts.Text):
+        at = place.points([mark.x], mark.y)
+        stream.log(path, recording.labels(at, [mark.text], _shade(mark.colour)), static=static)
+    elif not isinstance(mark, charts.Line) or np.size(mark.x) or mark.path:
+        above = LINES if isinstance(mark, charts.Line | charts.Steps | charts.Level) else AREAS
+        lines = place.lines(*_outlines(mark, place))
+        look: dict[str, Any] = {"colors": [_shade(mark.colour)], "draw_order": above + order}
+        look["radii"] = rr.Radius.ui_points(getattr(mark, "width", THIN))
+        if mark.name and lines:  # shown where one points
+            look |= {"labels": [mark.name] * len(lines), "show_labels": False}
+        strips = [line.astype(np.float32) for line in lines]
+        stream.log(path, rr.LineStrips2D(strips, **look), static=static)
 
 
 def legend(every: Sequence[Mark]) -> dict[str, str]:
@@ -57,26 +230,32 @@ def _shade(colour: str) -> tuple[int, int, int]:
     return INK if colour in PALE else palette.parts(colour)
 
 
-def _strips(mark: Mark, lines: Sequence[Floats], width: float, order: float) -> Part:
-    """Return lines of a colour, with the name of the mark when one points at them."""
-    look: dict[str, Any] = {"colors": [_shade(mark.colour)], "radii": rr.Radius.ui_points(width)}
-    if mark.name and lines:
-        look |= {"labels": [mark.name] * len(lines), "show_labels": False}
-    strips = [line.astype(np.float32) for line in lines]
-    return "", rr.LineStrips2D(strips, draw_order=order, **look), False
+def _outlines(mark: Mark, place: Place) -> Iterator[Floats]:
+    """Yield the lines of a mark, whether in the frame or not, in the units of linear axes."""
+    if isinstance(mark, charts.Line):
+        line = place.points(mark.x, mark.y)
+        if mark.step:
+            line = np.stack([np.repeat(line[:, 0], 2)[1:], np.repeat(line[:, 1], 2)[:-1]], axis=1)
+            # A last value that is repeated extends to its edge only.
+            line = line[: len(line) - (len(line) > 1 and line[-1, 1] == line[-2, 1])]
+        yield line
+    elif isinstance(mark, charts.Band):
+        there = np.asarray(mark.low) < np.asarray(mark.high)
+        for edge in (mark.low, mark.high):
+            yield place.points(mark.x, np.where(there, edge, np.nan))
+    elif isinstance(mark, charts.Steps):
+        heights = np.concatenate([[0.0], np.repeat(mark.values, 2), [0.0]])
+        yield place.points(np.repeat(mark.edges, 2), heights)
+    elif isinstance(mark, charts.Areas):
+        for shape in mark.shapes:
+            yield place.points(*np.concatenate([shape, shape[:1]]).T)
+    elif isinstance(mark, charts.Level | charts.Span):
+        ends = mark.value if isinstance(mark, charts.Level) else mark.ends
+        for end in np.ravel(np.asarray(ends, dtype=float)):
+            yield place.across(mark.axis, end)
 
 
-def _line(mark: charts.Line, place: Place, order: float) -> Iterator[Part]:
-    x, y = np.asarray(mark.x, dtype=float), np.asarray(mark.y, dtype=float)
-    if mark.step:
-        x, y = np.repeat(x, 2)[1:], np.repeat(y, 2)[:-1]
-        if y.size > 1 and y[-1] == y[-2]:
-            x, y = x[:-1], y[:-1]  # the last value extends to its edge only
-    if x.size or mark.path:
-        yield _strips(mark, place.lines(place.points(x, y)), mark.width, LINES + order)
-
-
-def _points(mark: charts.Points, place: Place, order: float) -> Iterator[Part]:
+def _points(mark: charts.Points, place: Place, order: float) -> Iterator[tuple[str, rr.Points2D]]:
     """Yield the points, on a larger ring in the colour of their edge and one in that of a halo."""
     at = place.points(mark.x, mark.y)
     at = at[place.inside(at) if mark.clip else np.isfinite(at).all(axis=1)].astype(np.float32)
@@ -89,79 +268,31 @@ def _points(mark: charts.Points, place: Place, order: float) -> Iterator[Part]:
     discs.append(("", mark.fill if hollow else mark.colour, size))
     for k, (leaf, colour, radius) in enumerate(discs):
         if colour:
-            look: dict[str, Any] = {
-                "colors": [_shade(colour)],
-                "radii": rr.Radius.ui_points(radius),
-            }
+            look: dict[str, Any] = {"colors": [_shade(colour)], "draw_order": order + 0.001 * k}
             if mark.name and not leaf:  # shown where one points
                 look |= {"labels": [mark.name], "show_labels": False}
-            yield leaf, rr.Points2D(at, draw_order=POINTS + order + 0.001 * k, **look), False
+            yield leaf, rr.Points2D(at, radii=rr.Radius.ui_points(radius), **look)
 
 
-def _band(mark: charts.Band, place: Place, order: float) -> Iterator[Part]:
-    there = np.asarray(mark.low) < np.asarray(mark.high)
-    edges = (np.where(there, edge, np.nan) for edge in (mark.low, mark.high))
-    lines = place.lines(*(place.points(mark.x, edge) for edge in edges))
-    yield _strips(mark, lines, 0.7, AREAS + order)
-
-
-def _steps(mark: charts.Steps, place: Place, order: float) -> Iterator[Part]:
-    heights = np.concatenate([[0.0], np.repeat(mark.values, 2), [0.0]])
-    outline = place.points(np.repeat(mark.edges, 2), heights)
-    yield _strips(mark, place.lines(outline), mark.width, LINES + order)
-
-
-def _areas(mark: charts.Areas, place: Place, order: float) -> Iterator[Part]:
-    closed = (np.concatenate([shape, shape[:1]]) for shape in mark.shapes)
-    lines = place.lines(*(place.points(*shape.T) for shape in closed))
-    yield _strips(mark, lines, 0.7, AREAS + order)
-
-
-def _across(place: Place, axis: str, value: float) -> Floats:
-    """Return the line across the frame at a value of an axis."""
-    at = place.points(*((value, 1.0) if axis == "x" else (1.0, value)))
-    ends = np.repeat(at[None], 2, axis=0)
-    if axis == "x":
-        ends[:, 1] = place.y
-    else:
-        ends[:, 0] = place.x
-    return ends
-
-
-def _level(mark: charts.Level, place: Place, order: float) -> Iterator[Part]:
-    lines = place.lines(_across(place, mark.axis, mark.value))
-    yield _strips(mark, lines, mark.width, LINES + order)
-
-
-def _span(mark: charts.Span, place: Place, order: float) -> Iterator[Part]:
-    ends = np.ravel(np.asarray(mark.ends, dtype=float))
-    lines = place.lines(*(_across(place, mark.axis, end) for end in ends))
-    yield _strips(mark, lines, 0.7, AREAS + order)
-
-
-def _text(mark: charts.Text, place: Place, _: float) -> Iterator[Part]:
-    yield (
-        "",
-        recording.labels(place.points([mark.x], mark.y), [mark.text], _shade(mark.colour)),
-        False,
-    )
-
-
-def _image(mark: charts.Image, place: Place, order: float) -> Iterator[Part]:
-    """Yield an image of classes; where one points, the viewer shows the name of the class."""
-    shown, classes = mark.values, list(mark.classes)
-    if mark.colours is not None:
-        shown, classes = _in_classes(mark.values, mark.colours)
+def _log_image(
+    stream: rr.RecordingStream, place: Place, mark: charts.Image, path: str, *, static: bool
+) -> None:
+    """Log an image of classes; where one points, the viewer shows the name of the class."""
+    shown, classes, look = mark.values, list(mark.classes), mark.colours
+    if look is not None:
+        shown, classes = _in_classes(mark.values, look)
+        _log_bar(stream, place, look)
     context: list[Any] = [(k, n, palette.parts(colour)) for k, (n, colour) in enumerate(classes)]
-    first = next(one for one in place.panel.marks if isinstance(one, charts.Image))
-    if mark.colours is not None and mark is not first:
+    images = [one for one in place.panel.marks if isinstance(one, charts.Image)]
+    if look is not None and mark is not images[0]:
         context[0] = (0, "", (0, 0, 0, 0))  # cells without a value show the image below
     kind = np.uint8 if len(context) <= BYTE else np.uint16
+    stream.log(path, place.of_pixels(shown.shape, mark.x, mark.y), static=True)
+    stream.log(path, rr.AnnotationContext(context), static=True)
+    order = images.index(mark) * 0.01
     image: Any = shown.astype(kind)
-    image = rr.SegmentationImage(image, opacity=1.0, draw_order=IMAGES + order)
-    yield "", place.of_pixels(shown.shape, mark.x, mark.y), True
-    yield "", rr.AnnotationContext(context), True
-    yield "", image, False
+    image = rr.SegmentationImage(image, opacity=1.0, draw_order=order)
+    stream.log(path, image, static=static)
 
 
 def _in_classes(
@@ -218,16 +349,3 @@ def _log_bar(stream: rr.RecordingStream, place: Place, look: charts.Colours) -> 
     texts = [typographic(f"{tick:.6g}") for tick in ticks]
     named = recording.labels([*places, [SIDE - 20, -55]], [*texts, plain(look.name)])
     stream.log(f"{path}/ticks", named, static=True)
-
-
-_PARTS: Final[dict[type[Mark], Callable[[Any, Place, float], Iterator[Part]]]] = {
-    charts.Line: _line,
-    charts.Points: _points,
-    charts.Band: _band,
-    charts.Steps: _steps,
-    charts.Areas: _areas,
-    charts.Level: _level,
-    charts.Span: _span,
-    charts.Text: _text,
-    charts.Image: _image,
-}

@@ -12,7 +12,7 @@ import rerun.blueprint as rrb
 
 from pendmap.charts import names, palette, registry
 from pendmap.charts.identification import simulated
-from pendmap.charts.methods import look
+from pendmap.charts.palette import look
 from pendmap.comparison import Comparison
 from pendmap.comparison.experiment import in_short
 from pendmap.diagnosis import Discrepancy
@@ -20,10 +20,9 @@ from pendmap.diagnosis.result import as_text as diagnosis_text
 from pendmap.formatting import MINUS
 from pendmap.identification import IdentificationReport
 from pendmap.identification.report import as_text as identification_text
-from pendmap.viewer import chart, moving, recording
-from pendmap.viewer.moving import Look
-from pendmap.viewer.place import plain
-from pendmap.viewer.recording import INK
+from pendmap.viewer import chart, recording
+from pendmap.viewer.marks import plain
+from pendmap.viewer.recording import INK, Look
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -42,10 +41,6 @@ GAP: Final = 8.0  # Interval, over the median, above which a gap is not bridged
 MILLI: Final = 1e3  # Residuals are in mrad, which needs fewer digits on the axis
 BAND: Final = 2.0  # Half width of the band of noise, standard deviations
 APART: Final = 2.5  # Distance between two pivots, arm lengths
-SEEN: Final = 0.3
-"""Angle between record and model that is drawn at a residual of three times the root mean square,
-rad."""
-MOST: Final = 1000.0  # Greatest magnification of the drawn deviations
 
 
 @dataclass(frozen=True)
@@ -78,33 +73,31 @@ class Motion:
 def contents(result: Any) -> dict[str, Any]:  # noqa: ANN401 (of several types)
     """Return layout, contents and name of the recording of what was found in records."""
     shown = registry.of_result(result)
-    drawn, text = chart.drawings(shown), summary(result)
-    every, larger = motions(result)
-    moving.refuse_late(shown.title, (one.time for one in every))
-    tabs = [container(f"run_{k}", one, larger) for k, one in enumerate(every, 1)]
+    drawn, text, every = chart.drawings(shown), summary(result), motions(result)
+    recording.refuse_late(shown.title, (one.time for one in every))
+    tabs = [container(f"run_{k}", one) for k, one in enumerate(every, 1)]
     tabs += [one.container for one in drawn]
 
     def write(stream: rr.RecordingStream) -> None:
         chart.log(stream, drawn, text)
         for number, one in enumerate(every, 1):
-            log(stream, f"run_{number}", one, larger)
+            log(stream, f"run_{number}", one)
 
     arrays = (v for one in every for v in (one.time, one.record, *(m[2] for m in one.models)))
     return {
         "name": plain(shown.title),
         "content": recording.content_of([shown.title, text, *arrays]),
-        "known": {"kind": type(result).__name__, "deviations_drawn_larger": larger},
+        "known": {"kind": type(result).__name__},
         "layout": recording.screen(rrb.Tabs(*tabs, active_tab=0), chart.ASIDE, shares=[11, 5]),
         "log": write,
     }
 
 
-def motions(result: Any) -> tuple[list[Motion], float]:  # noqa: ANN401 (of several types)
-    """Return the runs in motion, and the magnification of their deviations."""
+def motions(result: Any) -> list[Motion]:  # noqa: ANN401 (of several types)
+    """Return the runs in motion."""
     if isinstance(result, IdentificationReport):
-        return of_identification(result), 1.0
-    shown = of_diagnosis(result) if isinstance(result, Discrepancy) else []
-    return shown, magnified(shown) if shown else 1.0
+        return of_identification(result)
+    return of_diagnosis(result) if isinstance(result, Discrepancy) else []
 
 
 def summary(result: Any) -> str:  # noqa: ANN401 (of several types)
@@ -190,21 +183,13 @@ def _thinned(
     return Motion(run.name, time, record, drawn, sigma)
 
 
-def magnified(shown: Sequence[Motion]) -> float:
-    """Return the magnification of the pendulums' deviations: 1, 2, 5, 10, ..."""
-    wanted = SEEN / (3 * max(*(one.rms for one in shown), 1e-12))
-    power = 10.0 ** math.floor(math.log10(wanted))
-    return float(np.clip(max(m * power for m in (1, 2, 5) if m * power <= wanted), 1.0, MOST))
-
-
-def container(root: str, one: Motion, larger: float) -> rrb.Container:
+def container(root: str, one: Motion) -> rrb.Container:
     """Return the views of a run: pendulums above, angles and residuals below."""
     who = ", ".join(["record", *(shade.name for shade, *_ in one.models)])
-    times = f"; deviations {larger:g} times larger" if larger > 1 else ""
     wide = [-APART / 2, APART * (len(one.models) + 0.5)]
     pendulums = rrb.Spatial2DView(
         origin=f"/{root}/pendulum",
-        name=f"{who[:1].upper()}{who[1:]}{times}",
+        name=f"{who[:1].upper()}{who[1:]}",
         visual_bounds=rrb.VisualBounds2D(x_range=wide, y_range=[-1.15, 1.5]),
     )
     named = [("angle", f"{names.ANGLE}, {one.name}")]
@@ -219,11 +204,11 @@ def container(root: str, one: Motion, larger: float) -> rrb.Container:
     return rrb.Vertical(pendulums, *below, row_shares=[5, 3, 4][: 1 + len(below)], name=one.name)
 
 
-def log(stream: rr.RecordingStream, root: str, one: Motion, larger: float) -> None:
+def log(stream: rr.RecordingStream, root: str, one: Motion) -> None:
     """Log one run: angles, residuals with the noise, and pendulums side by side."""
-    moving.series(stream, f"{root}/angle/record", one.time, one.record, RECORD)
+    recording.series(stream, f"{root}/angle/record", one.time, one.record, RECORD)
     path = f"{root}/pendulum"
-    stream.log(f"{path}/data", moving.UPWARD, static=True)
+    stream.log(f"{path}/data", recording.UPWARD, static=True)
     pivots = [APART * place for place in range(1 + len(one.models))]
     spots = rr.Points2D([[x, 0.0] for x in pivots], colors=[INK], radii=rr.Radius.ui_points(3.0))
     stream.log(f"{path}/axes/pivots", spots, static=True)
@@ -233,26 +218,21 @@ def log(stream: rr.RecordingStream, root: str, one: Motion, larger: float) -> No
     _pendulum(stream, f"{path}/data/record", (one.time, one.record), RECORD, 0.0)
     for pivot, (shade, time, theta) in zip(pivots[1:], one.models, strict=True):
         leaf = f"{path}/data/{shade.name}"
-        moving.series(stream, f"{root}/angle/{shade.name}", time, theta, shade)
+        recording.series(stream, f"{root}/angle/{shade.name}", time, theta, shade)
         _pendulum(stream, f"{leaf}/record", (one.time, one.record), RECORD, pivot)
-        drawn = one.record - larger * (one.record - theta) if time is one.time else theta
-        _pendulum(stream, leaf, (time, drawn), shade, pivot)
+        _pendulum(stream, leaf, (time, theta), shade, pivot)
     for shade, residual in one.residuals():
         rms = MILLI * math.sqrt(float(np.nanmean(residual**2)))
         leaf = shade.name if len(one.models) > 1 else "residual"
         named_look = replace(shade, size=1.2, name=f"{shade.name}, {rms:.3g} mrad rms")
-        moving.series(stream, f"{root}/residual/{leaf}", one.time, MILLI * residual, named_look)
-    if one.rms and one.sigma:
-        _noise(stream, f"{root}/residual", one)
-
-
-def _noise(stream: rr.RecordingStream, path: str, one: Motion) -> None:
-    """Log the lines between which noise alone would keep 95 % of a residual."""
+        recording.series(stream, f"{root}/residual/{leaf}", one.time, MILLI * residual, named_look)
+    if not (one.rms and one.sigma):
+        return
     size = MILLI * BAND * one.sigma
-    for leaf, sign, text in (("above", 1.0, "+"), ("below", -1.0, MINUS)):
-        name = f"{text}{BAND:g} σ of the noise, {text}{size:.3g} mrad"
-        ends = np.full(2, sign * size)
-        moving.series(stream, f"{path}/{leaf}", one.time[[0, -1]], ends, Look(INK, 1.5, name=name))
+    for leaf, sign, mark in (("above", 1.0, "+"), ("below", -1.0, MINUS)):
+        name = f"{mark}{BAND:g} σ of the noise, {mark}{size:.3g} mrad"
+        lines = np.full(2, sign * size), Look(INK, 1.5, name=name)
+        recording.series(stream, f"{root}/residual/{leaf}", one.time[[0, -1]], *lines)
 
 
 def _pendulum(
@@ -264,5 +244,5 @@ def _pendulum(
     at = np.stack([pivot + np.sin(theta), -np.cos(theta)], axis=1)[known]
     arms = np.stack([np.broadcast_to((pivot, 0.0), at.shape), at], axis=1)
     arm, bob = (0.8, 4.0) if shade is RECORD and pivot else (3.0, 10.0)
-    moving.strips(stream, f"{path}/arm", time[known], arms, replace(shade, size=arm))
-    moving.points(stream, f"{path}/bob", time[known], at, replace(shade, size=bob, order=2.0))
+    recording.strips(stream, f"{path}/arm", time[known], arms, replace(shade, size=arm))
+    recording.points(stream, f"{path}/bob", time[known], at, replace(shade, size=bob, order=2.0))

@@ -12,14 +12,13 @@ import rerun.blueprint as rrb
 
 from pendmap.analysis.trajectory import energy
 from pendmap.charts import names, plane
-from pendmap.charts.chart import Panel
+from pendmap.charts.chart import Panel, holding
 from pendmap.errors import InputError
 from pendmap.files import facts
 from pendmap.units import TIME, Units
-from pendmap.viewer import moving, recording
-from pendmap.viewer.moving import FASTEST, Look
-from pendmap.viewer.place import Place
-from pendmap.viewer.recording import TIMELINE
+from pendmap.viewer import recording
+from pendmap.viewer.marks import Place
+from pendmap.viewer.recording import FASTEST, TIMELINE, Look
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -30,22 +29,16 @@ if TYPE_CHECKING:
 
     Attributes = Mapping[Any, Any]
 
-
 ARM = (120, 130, 145)
 BOB = (213, 94, 0)
 LINE = (120, 150, 190)
 PIVOT = (0, 158, 115)
 TRAIL = (230, 159, 0)
-
 TRAIL_POINTS = 48  # Greatest number of points of the bob's trail, which is one forcing period long
-
 MOVING = 50_000
 """Greatest number of positions of the pendulum; of a longer trajectory every k-th sample moves."""
-
 BINS = 100_000  # Bins of a long series, which is logged by its lowest and highest values
-
 CURVE = 20_000  # Samples of the phase curve, counted from the end
-
 _STATE: dict[str, tuple[Callable[[Units], str], tuple[int, int, int]]] = {
     "theta": (lambda _: names.ANGLE, (0, 114, 178)),
     "omega": (names.speed, (213, 94, 0)),
@@ -110,12 +103,12 @@ def refuse_beyond(time: Floats, velocity: Floats) -> None:
     fastest = float(np.max(np.abs(velocity), initial=0.0))
     if fastest > FASTEST:
         raise InputError(f"velocity reaches {fastest:g}: a recording holds up to {FASTEST:g}")
-    moving.refuse_late("until", [time])
+    recording.refuse_late("until", [time])
 
 
 def places(attrs: Attributes, velocity: Floats) -> list[Place]:
     """Return phase plane and section in frames that contain these velocities."""
-    units, theta, speeds = Units.of(attrs), (-math.pi, math.pi), plane.padded(velocity)
+    units, theta, speeds = Units.of(attrs), (-math.pi, math.pi), holding(velocity)
     sides, ratio = names.phase_plane(theta, speeds, units), names.proportion(theta, speeds, units)
     titles = {"phase": "Phase plane", "poincare": "Poincaré section"}
     return [Place.of(Panel(name, title, *sides, ()), ratio) for name, title in titles.items()]
@@ -131,7 +124,7 @@ def still(stream: rr.RecordingStream, around: Sequence[Place]) -> None:
     """Log the static parts: frames, and the direction of the pendulum's y axis."""
     for place in around:
         place.log_frame(stream)
-    stream.log("pendulum/data", moving.UPWARD, static=True)
+    stream.log("pendulum/data", recording.UPWARD, static=True)
 
 
 def series(stream: rr.RecordingStream, attrs: Attributes, motion: Floats, bins: int) -> None:
@@ -140,7 +133,7 @@ def series(stream: rr.RecordingStream, attrs: Attributes, motion: Floats, bins: 
     every = (theta, velocity, energy(theta, velocity, attrs))
     for (name, (text, colour)), values in zip(_STATE.items(), every, strict=True):
         at, shown = plane.envelope(time, values, bins)
-        moving.series(stream, f"state/{name}", at, shown, Look(colour, 1.5, name=text(units)))
+        recording.series(stream, f"state/{name}", at, shown, Look(colour, 1.5, name=text(units)))
 
 
 def moving_parts(
@@ -160,14 +153,14 @@ def moving_parts(
     pivot = np.stack([np.zeros_like(height), height], axis=1)
     bob = pivot + np.stack([np.sin(theta), -np.cos(theta)], axis=1)
     new = np.arange(since, time.size, every)
-    moving.points(stream, "pendulum/data/pivot", time[new], pivot[new], Look(PIVOT, 4.0))
-    moving.points(stream, "pendulum/data/bob", time[new], bob[new], Look(BOB, 9.0))
+    recording.points(stream, "pendulum/data/pivot", time[new], pivot[new], Look(PIVOT, 4.0))
+    recording.points(stream, "pendulum/data/bob", time[new], bob[new], Look(BOB, 9.0))
     arm = np.stack([pivot[new], bob[new]], axis=1)
-    moving.strips(stream, "pendulum/data/arm", time[new], arm, Look(ARM, 2.0))
+    recording.strips(stream, "pendulum/data/arm", time[new], arm, Look(ARM, 2.0))
     trail = bob[np.maximum(new[:, None] - behind(attrs, time), 0)]
-    moving.strips(stream, "pendulum/data/trail", time[new], trail, Look(TRAIL, 1.5))
+    recording.strips(stream, "pendulum/data/trail", time[new], trail, Look(TRAIL, 1.5))
     now = np.stack([plane.wrapped(theta[new]), velocity[new]], axis=1)
-    moving.points(stream, "phase/data/now", time[new], now, Look(BOB, 6.0))
+    recording.points(stream, "phase/data/now", time[new], now, Look(BOB, 6.0))
 
 
 def behind(attrs: Attributes, time: Floats) -> npt.NDArray[np.int64]:
@@ -193,4 +186,4 @@ def section(
     """Log one point per period; the view shows those up to the cursor, so the section grows."""
     at = np.stack([plane.wrapped(points[0]), points[1]], axis=1)
     number = rr.TimeColumn("period", sequence=period.astype(np.int64))
-    moving.points(stream, "poincare/data/points", time, at, Look(BOB, 1.8), number)
+    recording.points(stream, "poincare/data/points", time, at, Look(BOB, 1.8), number)

@@ -90,7 +90,7 @@ def test_the_figure_names_its_attractors_and_chaos_in_few_cells(
     assert {"rotation 1:+1", "tumbling chaos"} <= set(named(figure))
     assert [t.get_text() for t in figure.axes[1].get_yticklabels()] == ["up \u2192", "\u2190 down"]
     assert made(diagram, "velocity").axes[0].get_ylabel()
-    with pytest.raises(pendmap.InputError, match="in a diagram, got 'labels'"):
+    with pytest.raises(pendmap.InputError, match=r"no layer 'labels'.*theta, sweeps, exponent"):
         made(diagram, "labels")
     monkeypatch.setattr(drawn, "MOST", 4)
     every = drawn.families(diagram)

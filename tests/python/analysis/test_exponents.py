@@ -161,7 +161,7 @@ def test_figures_say_what_they_show(chaos: xr.Dataset, settled: xr.Dataset) -> N
     assert titles(figure)[1:] == ["mean over 256 trajectories", "exponents over 20 periods"]
     assert any("0.2736" in text or "0.2735" in text for text in named(figure))
     figure = made(settled)
-    assert titles(figure)[1:] == ["exponent over 20 periods"]
+    assert titles(figure) == ["growth along the start's own trajectory"]
     assert any("transient" in text for text in named(figure))
     with pytest.raises(pendmap.InputError, match="no layer 'labels'"):
         made(chaos, layer="labels")

@@ -168,11 +168,21 @@ def test_effects_are_named_with_units() -> None:
     assert "encoder_offset (d = -0.01 rad)" in bare
 
 
-def test_periods_without_drive_are_given_in_the_units_of_the_map() -> None:
-    for model, own in ((Rig(w0=6.2, c_over_m=0.5), "2π/w0"), (Pendulum(p=0), "2π")):
-        result = pendmap.basins(model, Grid.square(8))
-        assert basins.unit(result, "settle") == f"periods of {own} to settle"
-        assert "forcing" not in result.settle_periods.attrs["long_name"]
+@pytest.mark.parametrize(
+    ("model", "own", "said"),
+    [
+        (Rig(w0=6.2, c_over_m=0.5), "2π/w0", "a period is 2 pi / w0 = 1.013 s"),
+        (Pendulum(p=0), "2π", "a period is 2 pi)"),
+    ],
+)
+def test_periods_without_drive_are_given_in_the_units_of_the_map(
+    model: Rig | Pendulum, own: str, said: str
+) -> None:
+    result = pendmap.basins(model, Grid.square(8))
+    unit = basins.text_of(result, basins.LAYERS["settle"].unit)
+    assert unit == f"periods of {own} to settle"
+    assert said in result.attrs["summary"]
+    assert "forcing" not in result.settle_periods.attrs["long_name"]
 
 
 @pytest.mark.parametrize(

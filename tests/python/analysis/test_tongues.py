@@ -300,13 +300,6 @@ def test_added_frequencies_resolve_the_turns_of_curves(finer: xr.Dataset) -> Non
             assert np.allclose((rows[k] + rows[k + 1]) / 2, exact, atol=0.01)
 
 
-def test_an_undamped_tongue_goes_down_to_its_tip(finer: xr.Dataset) -> None:
-    panel = drawn.chart(finer).panels[0]
-    (line,) = [mark for mark in panel.marks if mark.path == "undamped"]
-    tips = np.stack([line.x, line.y], axis=1)
-    assert any(np.allclose(tip, (2.0, 0.0), atol=1e-3) for tip in tips)
-
-
 def test_steep_strips_of_stability_are_shaded_between_frequencies_too() -> None:
     # Between the first two tongues a strip rises by its own width from one frequency to the next.
     omega = np.linspace(0.8, 3.0, 60)

@@ -4,39 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import tempfile
-from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from scipy.special import chdtri
 
-from hidden import once
+from hidden import once, recorded
 from pendmap import InputError, virtual_rig
 from pendmap.diagnosis import Discrepancy, Thresholds, diagnose
 from pendmap.diagnosis.advice import required_gain
 from pendmap.diagnosis.summary import as_json
-from pendmap.records import read_experiment
 from pendmap.virtual_rig import Request, RunPlan
-
-if TYPE_CHECKING:
-    from pendmap.records import Experiment
-
-
-def recorded(request: Request) -> Experiment:
-    """Write and read an experiment without its truth."""
-    with tempfile.TemporaryDirectory() as folder:
-        where = virtual_rig.places(Path(folder) / "records", replace=True)
-        virtual_rig.write(virtual_rig.make(request), where)
-        return read_experiment(where.experiment)
-
-
-def hidden(*effects: str) -> Discrepancy:
-    """Return the diagnosis of two free decays of one rig."""
-    hides = effects or ("none",)
-    made = {"free": 2, "forced": 0, "noise": 0.2}
-    return diagnose(recorded(Request("hidden", seed=11, effects=hides, **made)))
 
 
 def test_equally_good_names_are_listed_with_what_reveals_them() -> None:
@@ -83,8 +61,8 @@ def test_an_effect_that_a_free_decay_does_not_show_has_no_limit() -> None:
 def test_limits_follow_from_the_thresholds_of_the_diagnosis() -> None:
     """An effect of one parameter must gain what noise gains with the given probability."""
     usual = once("none", seed=5, free=1, forced=0).advice.limits
-    request = Request("hidden", seed=5, effects=("none",), free=1, forced=0)
-    strict = diagnose(recorded(request), thresholds=Thresholds(chance=1e-6)).advice.limits
+    records, _ = recorded(seed=5, free=1, forced=0)
+    strict = diagnose(records, thresholds=Thresholds(chance=1e-6)).advice.limits
     gains = [
         required_gain(float(chdtri(1, chance / len(usual))), 1)
         for chance in (Thresholds().chance, 1e-6)
@@ -107,6 +85,10 @@ def test_a_limit_is_passed_in_95_of_100(count: int) -> None:
 @pytest.mark.thorough
 def test_an_effect_of_the_size_of_its_limit_is_found() -> None:
     """The limit follows from records without an effect; the same rig then has one of that size."""
+
+    def hidden(*effects: str) -> Discrepancy:
+        return once(*effects, seed=11, free=2, forced=0, noise=0.2)
+
     limit = hidden().advice.limits["encoder_gain"].size
     for size in (limit, -limit):
         assert hidden(f"encoder_gain,e={size:.6g}").verdict != "none"

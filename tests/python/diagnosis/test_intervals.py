@@ -12,8 +12,6 @@ from pendmap.diagnosis.fitted_model import fit_model
 from pendmap.diagnosis.refit import try_mirrored_places
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from pendmap.diagnosis import Discrepancy
     from pendmap.diagnosis.fitted_model import FittedModel
 
@@ -56,9 +54,9 @@ def _risen(found: Discrepancy, key: str, value: float) -> float:
     ],
 )
 def test_at_the_ends_of_an_interval_the_likelihood_has_fallen(
-    effect: str, shape: str, seed: int, noise: float, tmp_path: Path
+    effect: str, shape: str, seed: int, noise: float
 ) -> None:
-    found, truth = diagnosed(tmp_path, effect, forced=0, size=0.3, seed=seed, noise=noise)
+    found, truth = diagnosed(effect, forced=0, size=0.3, seed=seed, noise=noise)
     (named,) = found.effects
     assert named.name == effect
     low, high = named.ci95[shape]
@@ -70,8 +68,8 @@ def test_at_the_ends_of_an_interval_the_likelihood_has_fallen(
 
 
 @pytest.mark.thorough
-def test_a_place_that_may_be_on_either_side_is_given_twice(tmp_path: Path) -> None:
-    found, truth = diagnosed(tmp_path, "rough_spot", forced=0, size=0.3, seed=5)
+def test_a_place_that_may_be_on_either_side_is_given_twice() -> None:
+    found, truth = diagnosed("rough_spot", forced=0, size=0.3, seed=5)
     (named,) = found.effects
     assert named.name == "rough_spot"
     there, other = named.parameters["th0"], named.elsewhere["th0"]
@@ -82,8 +80,8 @@ def test_a_place_that_may_be_on_either_side_is_given_twice(tmp_path: Path) -> No
 
 
 @pytest.mark.thorough
-def test_a_place_on_a_known_side_is_given_once(tmp_path: Path) -> None:
-    found, truth = diagnosed(tmp_path, "rough_spot", size=1.0)
+def test_a_place_on_a_known_side_is_given_once() -> None:
+    found, truth = diagnosed("rough_spot", size=1.0)
     (named,) = found.effects
     assert named.elsewhere == {}
     assert named.parameters["th0"] * truth["rough_spot"]["th0"] > 0

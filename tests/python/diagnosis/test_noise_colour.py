@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import pytest
 
 from hidden import diagnosed
 from leftovers import COUNT, INTERVAL, SAMPLES, W0, coloured, counted, noise_of, swing
 from pendmap.diagnosis import Thresholds
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 COLOURS = (0.0, 0.3, 0.5, 0.7, 0.9)
 CHANCE = Thresholds().rest
@@ -104,11 +99,9 @@ def test_the_chance_of_a_gain_is_that_of_noise_alone() -> None:
 
 @pytest.mark.thorough
 @pytest.mark.parametrize(("seed", "correlation"), [(2, 0.5), (3, 0.7), (4, 0.5)])
-def test_coloured_noise_of_an_encoder_is_no_effect(
-    seed: int, correlation: float, tmp_path: Path
-) -> None:
+def test_coloured_noise_of_an_encoder_is_no_effect(seed: int, correlation: float) -> None:
     found, _ = diagnosed(
-        tmp_path, seed=seed, free=3, forced=0, correlation=correlation, noise=0.15, counts=2048
+        seed=seed, free=3, forced=0, correlation=correlation, noise=0.15, counts=2048
     )
     assert found.verdict == "none"
     # Errors of adjacent readings are correlated: they carry less information than independent ones.
@@ -116,11 +109,10 @@ def test_coloured_noise_of_an_encoder_is_no_effect(
 
 
 @pytest.mark.thorough
-def test_intervals_have_their_coverage_in_coloured_noise(tmp_path: Path) -> None:
+def test_intervals_have_their_coverage_in_coloured_noise() -> None:
     inside = []
     for seed in range(1, 9):
         found, truth = diagnosed(
-            tmp_path,
             "quadratic_drag",
             seed=seed,
             size=3.0,

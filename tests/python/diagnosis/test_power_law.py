@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from driven_decays import motion
-from hidden import diagnosed
-from pendmap import virtual_rig
+from hidden import diagnosed, recorded
 from pendmap.comparison.data import split_records
 from pendmap.diagnosis import diagnosed_model
 from pendmap.diagnosis.baseline import fit_baseline
@@ -21,7 +20,6 @@ from pendmap.identification.fit import fit_runs
 from pendmap.identification.runs import FitRun
 from pendmap.identification.sensitivity import window_slopes
 from pendmap.model import Effect, Formula, Rig, load_model, save_model
-from pendmap.records import read_experiment
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -116,14 +114,11 @@ def test_a_formula_with_a_power_is_fitted_alike(run: FitRun) -> None:
         assert a.stderr == pytest.approx(b.stderr, rel=0.02)
 
 
-def hidden(folder: Path, seed: int) -> tuple[dict[str, float], list[FittedModel]]:
+def hidden(seed: int) -> tuple[dict[str, float], list[FittedModel]]:
     """Hide a power law; return its truth and the fits from neighbouring powers of the scan."""
-    request = virtual_rig.Request(
-        "hidden", seed=seed, effects=("power_law_drag",), size=6.0, free=3, noise=0.05, rate=50.0
-    )
-    where = virtual_rig.places(folder / str(seed), replace=True)
-    virtual_rig.write(virtual_rig.make(request), where)
-    data = split_records(read_experiment(where.experiment))
+    given = {"seed": seed, "size": 6.0, "free": 3, "noise": 0.05, "rate": 50.0}
+    records, truth = recorded("power_law_drag", **given)
+    data = split_records(records)
     base, _ = fit_baseline(data)
     (shapes,) = (
         each for each in list_candidates((), driven=False) if each[0].name == "power_law_drag"
@@ -131,16 +126,14 @@ def hidden(folder: Path, seed: int) -> tuple[dict[str, float], list[FittedModel]
     trials = [
         fit_with_candidates(data, base, [shape], {Q: 1e-5}, level=1.0) for shape in shapes[1:3]
     ]
-    truth = tomllib.loads(where.truth.read_text(encoding="utf-8"))
-    (drag,) = (e for e in truth["effect"] if e["name"] == "power_law_drag")
-    return drag["parameters"], trials
+    return truth["power_law_drag"], trials
 
 
 @pytest.mark.thorough
-def test_errors_are_as_large_as_stated(tmp_path: Path) -> None:
+def test_errors_are_as_large_as_stated() -> None:
     scaled = []
     for seed in range(1, 17):
-        truth, trials = hidden(tmp_path, seed)
+        truth, trials = hidden(seed)
         one, other = (fitted.fit for fitted in trials)
         # Fits of candidates end 0.05 above the least sum of squares at most.
         assert abs(one[N] - other[N]) < 2 * math.sqrt(0.05) * one.estimates[N].stderr
@@ -159,9 +152,7 @@ def test_errors_are_as_large_as_stated(tmp_path: Path) -> None:
 
 @pytest.mark.thorough
 def test_a_diagnosis_gives_an_interval_of_the_power(tmp_path: Path) -> None:
-    found, truth = diagnosed(
-        tmp_path, "power_law_drag", size=4.0, free=3, forced=0, noise=0.05, rate=50.0
-    )
+    found, truth = diagnosed("power_law_drag", size=4.0, free=3, forced=0, noise=0.05, rate=50.0)
     (drag,) = (effect for effect in found.effects if effect.name == "power_law_drag")
     for name, (low, high) in drag.ci95.items():
         wide = high - low

@@ -56,22 +56,18 @@ def test_residuals_without_a_hidden_effect_are_explained_by_noise() -> None:
     assert all(0 <= chance <= 1 for chance in found.assessment.form.chances.values())
 
 
-def test_an_effect_outside_the_library_shows_in_the_residuals(tmp_path: Path) -> None:
-    found, _ = diagnosed(
-        tmp_path, "encoder_gain", size=3.0, free=3, forced=0, without=("encoder_gain",)
-    )
+def test_an_effect_outside_the_library_shows_in_the_residuals() -> None:
+    found, _ = diagnosed("encoder_gain", size=3.0, free=3, forced=0, without=("encoder_gain",))
     assert found.verdict in {"unknown", "partial"}
     assert found.assessment.form.chance < CHANCE
 
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("seed", [3, 5])
-def test_two_effects_in_the_place_of_one_are_named_with_reserve(seed: int, tmp_path: Path) -> None:
+def test_two_effects_in_the_place_of_one_are_named_with_reserve(seed: int) -> None:
     # Without the family of the drag two frictions fit its records to within the noise.
     own = [effect.name for effect in pendmap.effects() if effect.family == "damping"]
-    found, _ = diagnosed(
-        tmp_path, "quadratic_drag", seed=seed, size=3.0, free=3, forced=0, without=own
-    )
+    found, _ = diagnosed("quadratic_drag", seed=seed, size=3.0, free=3, forced=0, without=own)
     assert found.effects == () or all(effect.approximate for effect in found.effects)
     assert min(found.assessment.probabilities) < SURE
 
@@ -232,12 +228,12 @@ def test_an_effect_that_contains_the_name_takes_no_share() -> None:
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("seed", [34, 43])
-def test_without_noise_rounding_errors_give_no_effect(seed: int, tmp_path: Path) -> None:
+def test_without_noise_rounding_errors_give_no_effect(seed: int) -> None:
     clean = {"seed": seed, "noise": 0.0, "counts": 0}
-    nothing, _ = diagnosed(tmp_path, **clean)
+    nothing, _ = diagnosed(**clean)
     assert nothing.verdict == "none"
     assert nothing.gap.after < 1e-9
-    drag, truth = diagnosed(tmp_path, "quadratic_drag", **clean)
+    drag, truth = diagnosed("quadratic_drag", **clean)
     assert drag.verdict == "named"
     (effect,) = drag.effects
     assert effect.name == "quadratic_drag"

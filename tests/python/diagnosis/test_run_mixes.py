@@ -3,31 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
-import tempfile
-from pathlib import Path
 
 import pytest
 
 import pendmap
-from pendmap import virtual_rig
+from hidden import recorded
 from pendmap.diagnosis import diagnose
-from pendmap.records import Experiment, read_experiment
 
 CHIRP = pendmap.Effect("drive_chirp", {"r": 1e-4})
 RIG = pendmap.Rig(w0=6.2, c_over_m=0.05, Tr=0.08, p=0.1, Omega=10.0, effects=(CHIRP,))
-
-
-def recorded(free: int, forced: int, hidden: str, held: str) -> Experiment:
-    """Return short runs with a hidden effect, all of a kind marked to be held out."""
-    request = virtual_rig.Request(
-        "hidden", seed=5, effects=(hidden,), size=3.0, free=free, forced=forced, duration=8.0
-    )
-    with tempfile.TemporaryDirectory() as folder:
-        where = virtual_rig.places(Path(folder) / "lab", replace=True)
-        virtual_rig.write(virtual_rig.make(request), where)
-        experiment = read_experiment(where.experiment)
-    runs = (dataclasses.replace(run, hold_out=run.kind == held) for run in experiment.runs)
-    return dataclasses.replace(experiment, runs=tuple(runs))
 
 
 @pytest.mark.parametrize(
@@ -46,7 +30,9 @@ def recorded(free: int, forced: int, hidden: str, held: str) -> Experiment:
 def test_any_mix_of_runs_is_diagnosed(
     free: int, forced: int, hidden: str, held: str, model: pendmap.Rig | None
 ) -> None:
-    experiment = recorded(free, forced, hidden, held)
+    experiment, _ = recorded(hidden, seed=5, size=3.0, free=free, forced=forced, duration=8.0)
+    runs = (dataclasses.replace(run, hold_out=run.kind == held) for run in experiment.runs)
+    experiment = dataclasses.replace(experiment, runs=tuple(runs))
     found = diagnose(experiment, max_effects=1, model=model)
     assert found.data.held
     # A drive that no fitted run has is no candidate; a fitted one is.

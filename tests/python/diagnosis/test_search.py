@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from driven_decays import motion
-from pendmap import FitDiverged, InputError, read_experiment, virtual_rig
+from hidden import recorded
+from pendmap import FitDiverged, InputError
 from pendmap.comparison.data import DataSplit, split_records
 from pendmap.diagnosis import Thresholds, diagnose
 from pendmap.diagnosis.baseline import fit_baseline
@@ -27,14 +28,6 @@ from pendmap.records import Experiment, Run
 if TYPE_CHECKING:
     from pendmap.diagnosis.fitted_model import FittedModel
     from pendmap.identification.fit import TrajectoryFit
-
-
-def recorded(folder: Path, *effects: str, **given: float) -> DataSplit:
-    asked = {"seed": 3, "free": 3, "forced": 0} | given
-    request = virtual_rig.Request("hidden", effects=effects, **asked)  # type: ignore[arg-type]
-    where = virtual_rig.places(folder / "lab", replace=True)
-    virtual_rig.write(virtual_rig.make(request), where)
-    return split_records(read_experiment(where.experiment))
 
 
 def decay(drag: float) -> DataSplit:
@@ -204,8 +197,8 @@ def test_a_model_without_an_effect_is_never_worse_than_one_with_fewer(
     assert state.leave_out(best, drag) is known.base
 
 
-def test_a_fit_that_promises_far_less_than_its_target_is_given_up(tmp_path: Path) -> None:
-    data = recorded(tmp_path, "quadratic_drag", noise=0.03, free=4)
+def test_a_fit_that_promises_far_less_than_its_target_is_given_up() -> None:
+    data = split_records(recorded("quadratic_drag", noise=0.03, free=4, forced=0)[0])
     base, _ = fit_baseline(data)
     model = dataclasses.replace(base.fit.model, c_over_m=1.05 * base.fit.model.c_over_m)
     start = {"c_over_m": model.c_over_m}
@@ -233,9 +226,9 @@ def test_a_fit_that_promises_far_less_than_its_target_is_given_up(tmp_path: Path
 
 
 def test_a_diagnosis_whose_fit_does_not_converge_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    data = recorded(tmp_path, "quadratic_drag", noise=0.03, free=4)
+    data = split_records(recorded("quadratic_drag", noise=0.03, free=4, forced=0)[0])
 
     def stopped(*given: Any, **named: Any) -> TrajectoryFit:  # noqa: ANN401 (of fit_runs)
         # Each search lowers the sum of squares by a half, and stops.
@@ -249,12 +242,11 @@ def test_a_diagnosis_whose_fit_does_not_converge_is_refused(
         diagnose(data.experiment, max_effects=0)
 
 
-def test_a_fit_converges_where_the_pendulum_comes_to_rest(tmp_path: Path) -> None:
+def test_a_fit_converges_where_the_pendulum_comes_to_rest() -> None:
     # A forced run comes to rest at the limit of friction: in its last windows the sum of squares
     # has its minimum at a kink.
-    data = recorded(
-        tmp_path, "quadratic_drag", seed=4, free=5, forced=4, noise=0.1, counts=4096, rate=124.0
-    )
+    given = {"seed": 4, "free": 5, "forced": 4, "noise": 0.1, "counts": 4096, "rate": 124.0}
+    data = split_records(recorded("quadratic_drag", **given)[0])
     _, core = fit_baseline(data)
     assert core is not None
     still = [

@@ -5,16 +5,13 @@ Earlier versions named another effect, or had errors of many standard errors.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
 from hidden import diagnosed
 from pendmap.diagnosis import Thresholds
 from pendmap.diagnosis.verdict import probabilities
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 CHANCE = Thresholds().rest
 
@@ -69,9 +66,9 @@ MIXED, FREE = {"free": 5, "forced": 4}, {"free": 5, "forced": 0}
     ids=["side", "power", "idle", "width"],
 )
 def test_a_hidden_effect_is_named_alone_with_its_parameters(
-    effects: list[str], given: dict[str, Any], tmp_path: Path
+    effects: list[str], given: dict[str, Any]
 ) -> None:
-    found, truth = diagnosed(tmp_path, *effects, **given)
+    found, truth = diagnosed(*effects, **given)
     assert found.verdict == "named"
     assert sorted(effect.name for effect in found.effects) == sorted(effects)
     for effect in found.effects:
@@ -83,10 +80,9 @@ def test_a_hidden_effect_is_named_alone_with_its_parameters(
 
 
 @pytest.mark.thorough
-def test_an_effect_is_named_although_a_fit_loses_the_end_of_a_run(tmp_path: Path) -> None:
+def test_an_effect_is_named_although_a_fit_loses_the_end_of_a_run() -> None:
     # The drift was named a warm-up of 180 years: its fit had lost the end of a run.
     found, _ = diagnosed(
-        tmp_path,
         "viscous_drift",
         "rough_spot",
         seed=1006634931,
@@ -99,10 +95,9 @@ def test_an_effect_is_named_although_a_fit_loses_the_end_of_a_run(tmp_path: Path
 
 
 @pytest.mark.thorough
-def test_held_out_runs_with_little_information_reject_no_effect(tmp_path: Path) -> None:
+def test_held_out_runs_with_little_information_reject_no_effect() -> None:
     # The phases fitted to the held-out runs absorb the error of the frequency there.
     found, _ = diagnosed(
-        tmp_path,
         "drive_frequency",
         seed=605362845,
         size=0.46370751706754837,
@@ -116,12 +111,9 @@ def test_held_out_runs_with_little_information_reject_no_effect(tmp_path: Path) 
 
 
 @pytest.mark.thorough
-def test_a_name_that_does_not_predict_the_held_out_run_is_given_with_reserve(
-    tmp_path: Path,
-) -> None:
+def test_a_name_that_does_not_predict_the_held_out_run_is_given_with_reserve() -> None:
     # One drift explains the fitted runs; the held-out run has chi^2/N = 1.9.
     found, _ = diagnosed(
-        tmp_path,
         "viscous_drift",
         "viscous_warm_up",
         seed=673542390,
@@ -141,12 +133,10 @@ def test_a_name_that_does_not_predict_the_held_out_run_is_given_with_reserve(
 
 
 @pytest.mark.thorough
-def test_an_effect_of_size_0_is_dropped_although_the_fit_without_it_slipped(tmp_path: Path) -> None:
+def test_an_effect_of_size_0_is_dropped_although_the_fit_without_it_slipped() -> None:
     # The drag was found first with a slipped window; a bearing harmonic of size 0 led out of that
     # minimum and was named.
-    found, truth = diagnosed(
-        tmp_path, "quadratic_drag", seed=4, noise=0.1, counts=4096, rate=124.0, **MIXED
-    )
+    found, truth = diagnosed("quadratic_drag", seed=4, noise=0.1, counts=4096, rate=124.0, **MIXED)
     assert [effect.name for effect in found.effects] == ["quadratic_drag"]
     (effect,) = found.effects
     low, high = effect.ci95["q"]

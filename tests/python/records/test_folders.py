@@ -110,15 +110,6 @@ def test_a_column_of_times_overrides_a_rate(tmp_path: Path) -> None:
     assert "'t_s' has the times" in found(run)["rate-unused"].text
 
 
-def test_a_count_of_readings_is_neither_time_nor_angle(tmp_path: Path) -> None:
-    time, theta = clean()
-    path = tmp_path / "counted.txt"
-    path.write_text(text((np.arange(time.size), theta), ""), encoding="utf-8")
-    (run,) = pendmap.read_experiment(path, rate_hz=100).runs
-    np.testing.assert_allclose(run.time, time, atol=1e-9)
-    np.testing.assert_allclose(run.theta, theta, atol=2e-6)
-
-
 @pytest.mark.parametrize("columns", [1, 2])
 def test_without_times_and_rate_both_ways_are_named(
     pendmap_command: Run, tmp_path: Path, columns: int
@@ -184,10 +175,3 @@ def test_a_position_of_something_else_is_no_angle(tmp_path: Path) -> None:
     run = read(tmp_path, text((time, np.sin(0.7 * time), speed), "time,position,velocity"))
     assert "angle" not in run.channels
     assert "may be the angle itself" in found(run)["angle-column"].text
-
-
-def test_a_position_in_a_file_with_an_angle_is_a_position(tmp_path: Path) -> None:
-    time, theta = clean()
-    run = read(tmp_path, text((time, np.sin(0.7 * time), theta), "time,position,angle"))
-    assert run.channels["angle"] == "angle"
-    assert run.unused == ("position",)

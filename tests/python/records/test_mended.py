@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+import ast
 import math
-from typing import TYPE_CHECKING
+import string
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import pendmap
+from pendmap.records.experiment import texts
 from recorded import clean, experiment, found, motion, noisy, read, text
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 TIME, THETA = clean()
 SPEED = motion()[2]
@@ -28,7 +28,6 @@ MENDED = {
     "nanoseconds": ((1e9 * TIME, THETA), NAMES, "time-unit"),
     "rows in any order": ((TIME[ORDER], THETA[ORDER]), NAMES, "time-backwards"),
     "rows reversed": ((TIME[::-1], THETA[::-1]), NAMES, "time-backwards"),
-    "a counter overflows": (((TIME + 55) % 65.536, THETA), NAMES, "time-wrapped"),
     "degrees": ((TIME, THETA / DEGREE), NAMES, "angle-unit"),
     "a gauge at -90 degrees": ((TIME, THETA - TURN / 4), NAMES, "gauge-turned"),
     "a gauge at 90 degrees": ((TIME, THETA + TURN / 4), NAMES, "gauge-turned"),
@@ -145,3 +144,31 @@ def test_a_fault_is_reported(tmp_path: Path, case: str) -> None:
     if run.peaks_only:
         assert run.trusted.all()
         assert math.isnan(pendmap.noise_floor(run).sigma)
+
+
+PACKAGE = Path(pendmap.__file__).parent / "records"
+GIVEN = {
+    "note": set(),
+    "finding": set(),
+    "finding_of": set(),
+    "leave_out": {"number"},
+    "distrust": {"number"},
+}
+
+
+def test_each_finding_of_the_table_is_used_with_the_values_of_its_text() -> None:
+    used = set()
+    for path in PACKAGE.glob("*.py"):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        used |= {n.value for n in ast.walk(tree) if isinstance(n, ast.Constant)} & set(texts())
+        for call in (n for n in ast.walk(tree) if isinstance(n, ast.Call)):
+            name = getattr(call.func, "attr", getattr(call.func, "id", ""))
+            places = call.args[:2] if name in {"leave_out", "distrust"} else call.args[:1]
+            keys = [n.value for n in places if isinstance(n, ast.Constant)]
+            if name not in GIVEN or not keys or None in {k.arg for k in call.keywords}:
+                continue
+            text, _ = texts()[keys[-1]]
+            wanted = {field for _, field, _, _ in string.Formatter().parse(text) if field}
+            assert not wanted & {"at", "span", "where"}, keys[-1]
+            assert wanted <= {k.arg for k in call.keywords} | GIVEN[name], keys[-1]
+    assert used == set(texts())

@@ -36,10 +36,8 @@ def test_outliers_of_the_virtual_rig_do_not_spoil_its_noise(tmp_path: Path) -> N
     assert pendmap.noise_floor(run).sigma == pytest.approx(0.00205, rel=0.06)
 
 
-ADJACENT = [([500, 500 + k, 500 + 2 * k], [0.5, 2.1, -0.9], 0.001) for k in (2, 4, 6, 7, 8, 11)]
-ENDS = [
-    ([k], [size], 0.005) for k in (0, 1, 3, 6, 9, 1991, 1995, 1998, 2000) for size in (0.25, -2.0)
-]
+ADJACENT = [([500, 500 + k, 500 + 2 * k], [0.5, 2.1, -0.9], 0.001) for k in (2, 6, 11)]
+ENDS = [([k], [size], 0.005) for k in (0, 3, 9, 1991, 1998, 2000) for size in (0.25, -2.0)]
 
 
 @pytest.mark.parametrize(("at", "sizes", "noise"), [*ADJACENT, *ENDS])
@@ -63,7 +61,7 @@ def test_an_outlier_next_to_a_gap_is_found(tmp_path: Path) -> None:
     assert np.flatnonzero(~run.trusted).tolist() == [499, 500]
 
 
-@pytest.mark.parametrize("rate", [60.0, 100.0, 500.0])
+@pytest.mark.parametrize("rate", [60.0, 100.0])
 def test_two_percent_of_outliers_with_gaps_are_found(tmp_path: Path, rate: float) -> None:
     time, theta, _ = motion(duration=40.0, rate=rate)
     rng = np.random.default_rng(5)
@@ -78,13 +76,13 @@ def test_two_percent_of_outliers_with_gaps_are_found(tmp_path: Path, rate: float
     assert np.mean(run.trusted[~false[kept]]) > 0.985
 
 
-@pytest.mark.parametrize("start", [1.2, 2.9, 0.1])
-@pytest.mark.parametrize("rate", [25.0, 100.0, 1000.0])
+@pytest.mark.parametrize("start", [2.9, 0.1])
+@pytest.mark.parametrize("rate", [25.0, 1000.0])
 def test_a_record_without_outliers_has_no_finding(
     tmp_path: Path, start: float, rate: float
 ) -> None:
     time, theta, _ = motion(start=start, rate=rate)
-    for seed in range(4):
+    for seed in range(2):
         run = read(tmp_path, text((time, noisy(theta, 0.003, seed=seed))))
         assert "outliers" not in found(run)
         assert "missed-counts" not in found(run)

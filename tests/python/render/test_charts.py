@@ -9,14 +9,11 @@ import pytest
 import xarray as xr
 from matplotlib.text import Text
 
-import pendmap
 from drawn import made, named, written
 from pendmap import InputError, render, viewer
 from pendmap.charts import chart as charts
-from pendmap.charts import marks, registry
-from pendmap.viewer.chart import drawings
-from pendmap.viewer.marks import PALE
-from pendmap.viewer.place import Place, scaled
+from pendmap.charts import marks, plane, registry
+from pendmap.viewer.marks import Place, scaled, unscaled
 from recordings import recorded
 
 if TYPE_CHECKING:
@@ -111,23 +108,6 @@ def test_a_builder_is_enough_for_a_recording(dataset: xr.Dataset, tmp_path: Path
     ]
 
 
-def test_marks_of_a_recording_have_the_colours_of_the_chart(tmp_path: Path) -> None:
-    for dataset in (
-        pendmap.basins(pendmap.Pendulum(p=0.6), 20),
-        pendmap.bifurcation(pendmap.Pendulum(), {"p": (0.5, 1.5, 5)}),
-        pendmap.tongues(pendmap.Pendulum()),
-    ):
-        back = recorded(dataset, tmp_path)
-        (drawing,) = drawings(registry.build(registry.ready(dataset, "record")))
-        assert {f"/{place.root}" for place in drawing.places} <= set(back.views)
-        pairs = [(place, mark) for place in drawing.places for mark in place.panel.marks]
-        for place, mark in pairs:
-            shade = back.columns.get(f"/{place.root}/data/{mark.path}", {})
-            for kind in ("Points2D", "LineStrips2D"):
-                if mark.path and mark.colour not in PALE and f"{kind}:colors" in shade:
-                    assert shade[f"{kind}:colors"][0] == [int(f"{mark.colour[1:]}ff", 16)]
-
-
 def test_a_panel_without_a_frame_is_a_page(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     table = marks.Table(["method", "w0 (rad/s)"], [["decay", "6.2"]])
     note = marks.Text(0.0, 1.0, "a note")
@@ -144,6 +124,10 @@ def test_axes_that_are_logarithmic_on_both_sides_of_0_have_ticks() -> None:
     assert Place.of(panel, 1.0).x == pytest.approx((-3.0, 4.0))
     at = scaled(axis, [-1.0, -0.01, -0.005, 0.0, 0.1])
     assert at == pytest.approx([-3.0, -1.0, -0.5, 0.0, 2.0])
+    assert unscaled(axis, at) == pytest.approx([-1.0, -0.01, -0.005, 0.0, 0.1])
+    name, ticks = plane.ticks(axis, -1.0, 10.0)
+    assert name == axis.name
+    assert [text for _, text in ticks].count("0") == 1
 
 
 def test_without_a_builder_there_is_no_figure_and_no_recording(tmp_path: Path) -> None:
@@ -151,8 +135,3 @@ def test_without_a_builder_there_is_no_figure_and_no_recording(tmp_path: Path) -
     for write, name in ((render.draw, "a.png"), (viewer.record, "a.rrd")):
         with pytest.raises(InputError, match=r"kind 'example'; kinds .*: .*basins, .*traj"):
             write(unknown, tmp_path / name)
-
-
-def test_every_module_with_a_builder_is_a_kind() -> None:
-    assert {"basins", "melnikov", "trajectory"} <= set(registry.kinds())
-    assert not {"chart", "palette", "registry"} & set(registry.kinds())

@@ -103,16 +103,6 @@ def test_the_sent_data_are_the_trajectory(tmp_path: Path) -> None:
     assert {"/pendulum", "/phase", "/poincare", "/state/energy"} <= set(back.views)
 
 
-def test_the_command_sends_and_writes(tmp_path: Path, pendmap_command: Run) -> None:
-    with receiver(tmp_path) as (address, file, process):
-        words = ("simulate", *MODEL, "--until", "300", "--live", address, "--out", "a.nc")
-        run = pendmap_command(*words)
-        assert run.returncode == 0, run.stderr
-        ended(process)
-    theta = pendmap.load(tmp_path / "a.nc")["theta"].values
-    assert np.array_equal(ReadBack(file).rows("/state/theta", "Scalars:scalars"), theta)
-
-
 def test_ctrl_c_ends_it_with_what_was_computed(tmp_path: Path) -> None:
     with receiver(tmp_path) as (address, file, process):
         words = [str(COMMAND), "simulate", *MODEL, "--until", "3e6", "--samples", "8"]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,8 +9,7 @@ import pytest
 
 import motions
 import synthetic
-from pendmap.charts import basins, legend, palette
-from pendmap.viewer import chart
+from pendmap.charts import basins, legend, palette, plane
 from pendmap.viewer.chart import drawings
 from recordings import ReadBack, recorded
 
@@ -67,6 +65,10 @@ def test_a_map_is_read_back(tmp_path: Path) -> None:
     assert (np.isnan(settle) == ((periods < 0) | (label < 0))).all()
     settled = ~np.isnan(settle)
     assert (settle[settled] == np.maximum(periods[settled], 1)).all()
+    owner, points = dataset["point_attractor"].values, plane.points(dataset)
+    for number in dataset["id"].values:
+        at = np.array(back.columns[f"/basin/data/attractors/{number}"]["Points2D:positions"][0])
+        assert np.allclose(at, points[owner == number], atol=1e-6)
     turns = dataset["net_turns"].values.astype(float)
     assert (values(back, "/turns/data/turns") == turns)[label >= 0].all()
 
@@ -89,40 +91,11 @@ def test_every_class_has_its_name_and_colour(tmp_path: Path) -> None:
     assert set(np.unique(turns).tolist()) <= set(back.names("/turns/data/turns"))
 
 
-def test_attractors_are_drawn_at_their_points_and_named(tmp_path: Path) -> None:
-    dataset = synthetic.painted(synthetic.USUAL[:4])
-    back = recorded(dataset, tmp_path)
-    owner = dataset["point_attractor"].values
-    points = np.stack([dataset["point_theta"].values, dataset["point_velocity"].values], axis=1)
-    for number in dataset["id"].values:
-        at = np.array(back.columns[f"/basin/data/attractors/{number}"]["Points2D:positions"][0])
-        assert np.allclose(at, points[owner == number], atol=1e-6)
-    names = ("rest", "rotation 1:+1", "rotation 1:\N{MINUS SIGN}1", "oscillation 2:0")
-    for number, name in enumerate(names, 1):
-        label = back.one(f"/basin/data/attractors/{number}", "Points2D:labels")
-        assert label.startswith(f"{name}, ")
-
-
-def test_transforms_bring_the_corners_of_the_map_to_the_frame(tmp_path: Path) -> None:
-    dataset = synthetic.painted(shape=(20, 10), theta=(-1.0, 3.0), velocity=(-2.0, 4.0))
-    back = recorded(dataset, tmp_path)
-    corners = np.array([[0.0, 0.0, 0.0], [10.0, 20.0, 0.0]])
-    for entity in ("/basin/data/labels", "/basin/data"):
-        matrix = np.reshape(back.one(entity, "Transform3D:mat3x3"), (3, 3)).T
-        corners = corners @ matrix.T + back.one(entity, "Transform3D:translation")
-        if entity == "/basin/data/labels":
-            assert np.allclose(corners[:, :2], [[-1.0, -2.0], [3.0, 4.0]], atol=1e-5)
-    frame = np.array(back.one("/basin/axes/frame", "LineStrips2D:strips")[0])
-    low, high = frame.min(axis=0), frame.max(axis=0)
-    assert np.allclose(corners[0, :2], [low[0], high[1]], atol=1e-3), (
-        "lowest velocity at the bottom"
-    )
-    assert np.allclose(corners[1, :2], [high[0], low[1]], atol=1e-3)
-
-
 def test_legend_and_summary(tmp_path: Path) -> None:
     dataset = synthetic.painted(synthetic.USUAL[:4], (30, 40), undecided=12, **synthetic.UNRELIABLE)
     back = recorded(dataset, tmp_path)
+    assert back.one("/__properties/pendmap", "p") == 1.0
+    assert back.one("/__properties/pendmap", "simd") == "avx2"
     text = back.one("/legend", "TextDocument:text")
     line = next(line for line in text.splitlines() if line.startswith("- rotation 1:+1"))
     assert line.endswith("twin of rotation 1:\N{MINUS SIGN}1: vermillion")
@@ -130,13 +103,6 @@ def test_legend_and_summary(tmp_path: Path) -> None:
     assert "labels unreliable: 20.7 % change under half the step or mirroring" in text
     summary = back.one("/summary", "TextDocument:text")
     assert summary.split("\n\n") == dataset.attrs["summary"].splitlines()
-
-
-def test_parameters_are_properties(tmp_path: Path) -> None:
-    back = recorded(synthetic.painted(p=1.7, gamma=0), tmp_path)
-    assert back.one("/__properties/pendmap", "p") == 1.7
-    assert back.one("/__properties/pendmap", "gamma") == 0
-    assert back.one("/__properties/pendmap", "simd") == "avx2"
 
 
 def test_every_view_has_an_origin_and_a_name(tmp_path: Path) -> None:
@@ -172,30 +138,6 @@ def test_a_single_chaotic_attractor_is_recorded(tmp_path: Path) -> None:
     assert tabs_of(dataset) == ["turns", "exponent", "basin"]
 
 
-def test_a_map_without_damping_is_recorded(tmp_path: Path) -> None:
-    dataset = motions.chaotic(gamma=0.0, p=0.6, omega=2.0, cells=20, periods=4)
-    back = recorded(dataset, tmp_path)
-    assert "No attractors" in back.one("/legend", "TextDocument:text")
-    assert not [entity for entity in back.columns if "attractors" in entity]
-
-
-@pytest.mark.parametrize(
-    "dataset",
-    [
-        synthetic.painted((), (4, 3)),
-        synthetic.painted(synthetic.USUAL[:1], (1, 1)),
-        synthetic.painted(synthetic.USUAL, (3, 2)),
-        synthetic.painted(synthetic.USUAL[10:12]),
-        synthetic.painted(theta=(-4 * math.pi, 4 * math.pi), velocity=(5.0, 6.0)),
-    ],
-    ids=["none", "one cell", "twelve in six cells", "two chaotic", "attractors outside"],
-)
-def test_unusual_maps_are_recorded(tmp_path: Path, dataset: xr.Dataset) -> None:
-    back = recorded(dataset, tmp_path)
-    labels = back.image("/basin/data/labels", "SegmentationImage", np.uint8)
-    assert (labels == dataset["label"].values + 1).all()
-
-
 def test_a_failed_exponent_is_covered(tmp_path: Path) -> None:
     dataset = motions.chaotic(cells=12, periods=2)
     dataset["finite_time_exponent"][3, 4] = np.nan
@@ -205,16 +147,3 @@ def test_a_failed_exponent_is_covered(tmp_path: Path) -> None:
     assert cover[3, 4] == 0
     assert colours(back, "/exponent/data/without")[0] == palette.FAILED
     assert np.argwhere(np.isnan(values(back, "/exponent/data/exponent"))).tolist() == [[3, 4]]
-
-
-def test_a_map_beyond_the_largest_image_is_thinned(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(chart, "CELLS", 16)
-    dataset = synthetic.painted(synthetic.USUAL[:3], (32, 40), undecided=5)
-    back = recorded(dataset, tmp_path)
-    labels = back.image("/basin/data/labels", "SegmentationImage", np.uint8)
-    rows, columns = ((np.arange(16) + 0.5) * (n / 16) for n in (32, 40))
-    assert (
-        labels == dataset["label"].values[np.ix_(rows.astype(int), columns.astype(int))] + 1
-    ).all()

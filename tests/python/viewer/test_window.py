@@ -47,6 +47,8 @@ def test_without_a_display_the_error_names_the_remedy(
     began = time.monotonic()
     with pytest.raises(viewer.NoDisplayError, match=r"DISPLAY.*pendmap view a\.rrd"):
         viewer.open_viewer(recording)
+    with pytest.raises(viewer.NoDisplayError, match=r"DISPLAY.*copy the \.rrd"):
+        viewer.check_display()
     assert time.monotonic() - began < 1.0
 
 

@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, Any
 import click
 import cloup
 
-from pendmap.cli.parse.groups import LONG, MACHINE, OUTPUT, STARTS, WORKERS
+from pendmap.cli.parse.groups import LONG, MACHINE, OUTPUT, STARTS
 from pendmap.cli.parse.types import (
     AXIS,
     INSTRUCTION_SET,
     INTEGER,
     PICTURES,
-    TEXT,
     output_file,
     output_or_address,
 )
@@ -135,17 +134,7 @@ def take_window(given: dict[str, Any], usual: Grid) -> Grid:
     return type(usual)(theta or usual.theta, velocity or usual.velocity)
 
 
-store_options = added(
-    flag("--resume", "Go on with the unfinished run in --out F.zarr.", group=LONG),
-    option("--workers", INTEGER, "Processes of this machine that compute.", group=WORKERS),
-    option(
-        "--scheduler",
-        TEXT,
-        "Dask scheduler whose workers compute, like tcp://host:8786.",
-        group=WORKERS,
-    ),
-)
-"""Options of analyses in tiles: whether a store is resumed, and who computes."""
+resume_option = flag("--resume", "Go on with the unfinished run in --out F.zarr.", group=LONG)
 
 
 def output_options(

@@ -179,18 +179,12 @@ def inapplicable(reason: str, warnings: Sequence[str] = ()) -> Identification:
     return Identification(warnings=(*warnings, f"not applicable: {reason}"), applicable=False)
 
 
-def too_few(  # noqa: PLR0913, PLR0917 (what is counted, and how it is worded)
-    count: int,
-    least: int,
-    total: int | None = None,
-    where: str = "",
-    warnings: Sequence[str] = (),
-    because: str = "",
+def too_few(  # noqa: PLR0913, PLR0917 (what is counted, and why)
+    count: int, least: int, total: int, where: str = "", warnings: Sequence[str] = (), why: str = ""
 ) -> Identification:
     """Return an inapplicable result: ``count`` of ``total`` peaks, but ``least`` are needed."""
-    peaks = counted(count, "peak") if total is None else f"{count} of {counted(total, 'peak')}"
-    why = f": {because}" if because else ""
-    return inapplicable(f"{f'{peaks} {where}'.strip()}, {least} are needed{why}", warnings)
+    peaks = f"{count} of {counted(total, 'peak')} {where}".strip()
+    return inapplicable(f"{peaks}, {least} are needed{why}", warnings)
 
 
 def identified(  # noqa: PLR0913 (all of a result)

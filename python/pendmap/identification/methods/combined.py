@@ -25,8 +25,6 @@ Reading = Literal["all", "odd_ends", "odd_triplets"]  # Interpretations of the p
 CUT: Final = math.radians(12.0)
 """Amplitude above which peaks are excluded, rad: the pendulum is nonlinear there."""
 
-ENDS_ABOVE: Final = "the record ends above it"  # Reason why a record has no peaks below the cut
-
 _FEWEST: Final = 4  # Fewest peaks below the cut
 _USES: Final[dict[Reading, str]] = {
     "all": "of them the first two and the last two",
@@ -137,13 +135,7 @@ def small_peaks(peaks: Peaks, cut: float = CUT) -> tuple[Peaks, list[str]]:
     return small, warnings
 
 
-def from_peaks(
-    peaks: Peaks,
-    record: tuple[Floats, Floats] | None = None,
-    *,
-    reading: Reading = "all",
-    cut: float = CUT,
-) -> Identification:
+def from_peaks(peaks: Peaks, *, reading: Reading = "all", cut: float = CUT) -> Identification:
     """Identify viscous damping and Coulomb friction by the combined decrement as printed.
 
     Peaks above the cut (12 degrees) are excluded; eq. 2.7 gives ``delta``, eq. 2.10 ``theta_r``,
@@ -152,8 +144,7 @@ def from_peaks(
     cycles": ``odd_ends`` applies eq. 2.7 to the first and the last pair of peaks that begin at an
     odd peak, ``odd_triplets`` averages over such triplets. The method is biased by the nonlinearity
     (1.5 % in delta at 12 degrees) and by a zero error of the angle, and eq. 2.7 uses only four
-    peaks; the module ``repaired`` corrects that. The samples of the ``record``, s and rad, serve to
-    explain missing peaks below the cut.
+    peaks; the module ``repaired`` corrects that.
     """
     small, warnings = small_peaks(peaks, cut)
     size = np.abs(small.amplitude)
@@ -165,11 +156,8 @@ def from_peaks(
         small = small.select(np.arange(len(small)) < size.size)
     least = _FEWEST + (reading != "all") * 2
     if size.size < least:
-        why = ""
-        if len(peaks) and not len(small):
-            lost = record is not None and _unresolved(*record, peaks, cut)
-            why = "peaks are not resolved: too few samples a period" if lost else ENDS_ABOVE
         where = f"under {math.degrees(cut):.3g} degrees"
+        why = ": the record ends above it" if len(peaks) and not len(small) else ""
         return too_few(size.size, least, len(peaks.turned), where, warnings, why)
     parity = int(small.index[0]) % 2
     count = len(small)
@@ -205,17 +193,3 @@ def from_peaks(
         ),
         warnings=warnings,
     )
-
-
-def _unresolved(time: Floats, theta: Floats, peaks: Peaks, cut: float) -> bool:
-    """Return whether a record continues below a cut with peaks that were not found."""
-    if time.size < _FEWEST or len(peaks) < 2:  # noqa: PLR2004 (one half swing)
-        return False
-    size = np.abs(theta - np.median(theta[-(theta.size // 4) :]))
-    above = np.flatnonzero(size >= cut)
-    first = int(above[-1]) + 1 if above.size else 0
-    # Within a half swing after the last large peak, turns are noise.
-    if first == time.size or time[-1] - time[first] < 2 * np.diff(peaks.time).min():
-        return False
-    turns = np.count_nonzero(np.diff(np.sign(np.diff(theta[first:]))))
-    return bool(turns >= _FEWEST)

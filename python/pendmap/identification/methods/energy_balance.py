@@ -13,7 +13,6 @@ import numpy as np
 
 from pendmap.identification.methods.base import (
     MISFIT,
-    NEEDS_SAMPLES,
     Identification,
     identified,
     inapplicable,
@@ -37,7 +36,7 @@ _SAMPLES: Final = 25
 """Samples per period below which a warning is given: the quartic smooths the velocity."""
 
 
-def from_peaks(peaks: Peaks, record: tuple[Floats, Floats] | None) -> Identification:
+def from_peaks(peaks: Peaks, record: tuple[Floats, Floats]) -> Identification:
     """Identify viscous damping and Coulomb friction from the energy loss of each half cycle.
 
     ``w0^2 (cos(x_{k+1} - b) - cos(x_k - b)) = c_over_m int th'^2 dt + Tr abs(x_{k+1} - x_k)``
@@ -45,11 +44,9 @@ def from_peaks(peaks: Peaks, record: tuple[Floats, Floats] | None) -> Identifica
     over measured velocities from local quartics, less the noise's share; across a gap it is that of
     an undamped pendulum. Generalized least squares account for peaks shared by half cycles.
     """
-    if record is None:
-        return inapplicable(NEEDS_SAMPLES)
     turned = peaks.turned
     if len(turned) < _FEWEST:
-        return too_few(len(turned), _FEWEST)
+        return too_few(len(turned), _FEWEST, len(turned))
     pairs = np.flatnonzero(np.diff(turned.index) == 1)
     small = turned.select(np.abs(turned.amplitude) < _LARGEST)
     if len(small) < _FEWEST:

@@ -1,31 +1,21 @@
-"""Registry of all methods by name, and their application to one record."""
+"""Registry of all methods by name, and the application of those of peaks."""
 
 from __future__ import annotations
 
 import dataclasses
 import functools
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from pendmap.errors import InputError
 from pendmap.formatting import Estimate
-from pendmap.identification.methods import (
-    combined,
-    de_paula,
-    energy_balance,
-    log_decrement,
-    repaired,
-    trajectory,
-)
+from pendmap.identification.methods import combined, energy_balance, lines, repaired
 from pendmap.identification.methods.base import NEEDS_SAMPLES, Identification, inapplicable
-from pendmap.identification.peaks import find_peaks, samples
-from pendmap.signal.robust import from_first, normal_scale
+from pendmap.signal.robust import normal_scale
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
-
-    from numpy.typing import ArrayLike
 
     from pendmap.identification.peaks import Peaks
     from pendmap.signal import Floats
@@ -33,18 +23,16 @@ if TYPE_CHECKING:
 
 BEST: Final = "trajectory"  # The default method
 
-_OF_PEAKS: Final[Mapping[str, Callable[[Peaks, tuple[Floats, Floats] | None], Identification]]] = {
+_OF_PEAKS: Final[Mapping[str, Callable[[Peaks], Identification]]] = {
     "combined": combined.from_peaks,
     "combined_odd_ends": functools.partial(combined.from_peaks, reading="odd_ends"),
     "combined_odd_triplets": functools.partial(combined.from_peaks, reading="odd_triplets"),
-    "combined_repaired": lambda peaks, _: repaired.from_peaks(peaks),
-    "log_decrement": lambda peaks, _: log_decrement.from_peaks(peaks),
-    "de_paula": lambda peaks, _: de_paula.from_peaks(peaks),
-    "energy_balance": energy_balance.from_peaks,
+    "combined_repaired": repaired.from_peaks,
+    "log_decrement": lines.log_decrement,
+    "de_paula": lines.de_paula,
 }
-"""Methods of peaks by name, which also read the samples (s, rad) of the record if it has them."""
 
-METHODS: Final = (BEST, *_OF_PEAKS)
+METHODS: Final = (BEST, *_OF_PEAKS, "energy_balance")
 """Names of all methods, the default first, then in the order of the paper's tables."""
 
 
@@ -59,58 +47,36 @@ def check_names(methods: Iterable[str] | None) -> list[str]:
     return names
 
 
-def identify_record(  # noqa: PLR0913 (the record, and what is known of it)
-    time: ArrayLike,
-    theta: ArrayLike,
-    *,
-    sigma: float | None = None,
-    trusted: ArrayLike | None = None,
-    methods: Iterable[str] | None = None,
-    peaks: Peaks | None = None,
-    progress: Callable[[int, int], object] | None = None,
-) -> dict[str, Identification]:
-    """Return the results of several methods for one free decay (s, rad), also inapplicable ones.
+def apply_method(
+    name: str, peaks: Peaks, record: tuple[Floats, Floats] | None = None
+) -> Identification:
+    """Return the result of a method for the peaks of a free decay, also an inapplicable one.
 
-    ``sigma`` (rad), ``trusted`` and ``peaks`` are by default found from the record.
+    ``record`` are the samples of the decay, s and rad, if there are any.
     """
-    names = check_names(methods)
-    elapsed, first = from_first(time)
-    record = samples(elapsed, theta, trusted)
-    if record[0].size == 0:
-        raise InputError("time must have samples of a decay, got none that may be used")
-    known: dict[str, Any] = {"sigma": sigma, "trusted": trusted}
-    if peaks is None and names != [BEST]:
-        peaks = find_peaks(time, theta, **known)
-    results = {}
-    for name in names:
-        if peaks is None or name == BEST:
-            one = trajectory.identify(time, theta, **known)
-        else:
-            one = _OF_PEAKS[name](peaks.later(-first), record)
-        results[name] = dataclasses.replace(one, method=name)
-        if progress is not None:
-            progress(len(results), len(names))
-    return results
+    if peaks.lacking:
+        result = inapplicable(peaks.lacking)
+    elif name == "energy_balance" and record is not None:
+        result = energy_balance.from_peaks(peaks, record)
+    else:
+        result = _OF_PEAKS[name](peaks) if name in _OF_PEAKS else inapplicable(NEEDS_SAMPLES)
+    return dataclasses.replace(result, method=name)
 
 
-def identify_peaks(peaks: Peaks, methods: Iterable[str] | None = None) -> dict[str, Identification]:
+def identify_peaks(peaks: Peaks, names: Iterable[str]) -> dict[str, Identification]:
     """Identify damping from measured peaks alone.
 
-    Standard errors of peaks are estimated from their scatter unless given; with too few peaks there
-    are none, and no intervals.
+    Standard errors of peaks are estimated from their scatter; with too few peaks there are none,
+    and no intervals.
     """
-    peaks = peaks.later(-float(peaks.time[0])) if len(peaks) else peaks
-    if not peaks.known:
-        size = peaks.time.shape
-        peaks = dataclasses.replace(
-            peaks,
-            stderr_time=np.full(size, scatter(peaks.time)),
-            stderr_amplitude=np.full(size, scatter(np.abs(peaks.amplitude))),
-        )
-    results = {}
-    for name in check_names(methods):
-        one = inapplicable(NEEDS_SAMPLES) if name == BEST else _OF_PEAKS[name](peaks, None)
-        results[name] = one = dataclasses.replace(one, method=name)
+    size = peaks.time.shape
+    peaks = dataclasses.replace(
+        peaks.later(-float(peaks.time[0])) if len(peaks) else peaks,
+        stderr_time=np.full(size, scatter(peaks.time)),
+        stderr_amplitude=np.full(size, scatter(np.abs(peaks.amplitude))),
+    )
+    results = {name: apply_method(name, peaks) for name in names}
+    for name, one in results.items():
         # Errors of 0 are unknown errors; a fit estimates errors from its residuals.
         if not peaks.known and not any(estimate.stderr for estimate in one.estimates.values()):
             bare = {n: Estimate(estimate.value) for n, estimate in one.estimates.items()}

@@ -13,49 +13,29 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap.errors import FitDiverged, InputError, check_number
+from pendmap.errors import FitDiverged, InputError
 from pendmap.formatting import Estimate, counted
 from pendmap.identification.fit import fit_runs
 from pendmap.identification.methods.base import Identification
-from pendmap.identification.methods.start import TooShortError, starting_values
-from pendmap.identification.parameters import OPPOSING, SENSOR, opposing
-from pendmap.identification.readings import as_fit_run, reading_of, reading_of_run
-from pendmap.identification.turning import rough_start
-from pendmap.identification.valley import upper_limit
+from pendmap.identification.parameters import OFFSET, OPPOSING, SENSOR, opposing
+from pendmap.identification.readings import as_fit_run, reading_of_run
+from pendmap.identification.sensitivity import upper_limit
+from pendmap.identification.turning import TooShortError, rough_start
 from pendmap.model import Rig
 from pendmap.model.effects import Effect
-from pendmap.records import Run
-from pendmap.signal.robust import from_first, span
+from pendmap.signal.robust import span
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
 
-    from numpy.typing import ArrayLike
-
     from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.readings import Reading
     from pendmap.identification.runs import FitRun
-    from pendmap.signal import Floats
+    from pendmap.records import Run
 
 
-TOO_GOOD: Final = 0.7
-"""chi^2 per degree of freedom below which sigma is reported as too large."""
-OFFSET: Final = "encoder_offset"  # Effect that is the sensor's zero error
-POOR: Final = 0.1  # Rms residual over the record's standard deviation above which a fit is poor
 LACKING: Final = 4.0
 """Widening above which readings have equal weights: else the slowest alone would dominate."""
-
-
-def identify(
-    time: ArrayLike,
-    theta: ArrayLike,
-    **choices: Any,  # noqa: ANN401 (those of fit_decay)
-) -> Identification:
-    """Identify the damping of a free decay, for the choices of :func:`fit_decay`."""
-    try:
-        return identification_of(physical(fit_decay(time, theta, **choices)))
-    except TooShortError as error:
-        return Identification(warnings=(str(error),), applicable=False)
 
 
 def identification_of(joint: JointFit) -> Identification:
@@ -66,11 +46,10 @@ def identification_of(joint: JointFit) -> Identification:
     names = tuple(renamed.get(name, name) for name in fit.names)
     # If the model does not fit, errors are widened by the misfit.
     wider = math.sqrt(fit.widening)
-    widened_estimates = [
-        dataclasses.replace(e, stderr=None if e.stderr is None else wider * e.stderr)
-        for e in fit.estimates.values()
-    ]
-    estimates = dict(zip(names, widened_estimates, strict=True))
+    estimates = {
+        name: dataclasses.replace(e, stderr=None if e.stderr is None else wider * e.stderr)
+        for name, e in zip(names, fit.estimates.values(), strict=True)
+    }
     for name, limit in joint.limits.items():
         estimates[name] = Estimate(0.0, None, (0.0, limit))
     first = [name for name in ("w0", *OPPOSING) if name in estimates]
@@ -95,57 +74,24 @@ def identification_of(joint: JointFit) -> Identification:
     )
 
 
-def fit_decay(
-    time: ArrayLike,
-    theta: ArrayLike,
-    *,
-    sigma: float | None = None,
-    trusted: ArrayLike | None = None,
-    **choices: Any,  # noqa: ANN401 (those of fit_from_start)
-) -> JointFit:
-    """Return the fit to a free decay (s, rad), for the choices of :func:`fit_from_start`."""
-    t, x = (np.ascontiguousarray(values, dtype=np.float64) for values in (time, theta))
-    if t.shape != x.shape or t.ndim != 1:
-        raise InputError(f"time has {t.shape} values and theta {x.shape}: they must be as many")
-    if not (np.all(np.isfinite(t)) and np.all(np.isfinite(x))):
-        raise InputError("time and theta must be finite numbers, one is not")
-    if sigma is not None and check_number("sigma", sigma) <= 0:
-        raise InputError(f"sigma must be a number above 0, got {sigma:g}")
-    good = np.ones(t.shape, bool) if trusted is None else np.asarray(trusted, bool)
-    if good.shape != t.shape:
-        raise InputError("trusted and time differ in length: they must be as many")
-    run = Run("", "", "free", t, x, good)
-    reading = reading_of(from_first(t)[0], x, sigma, trusted=good)
-    fit, readings = fit_from_start([as_fit_run(run, reading)], [reading], **choices)
-    return JointFit(fit, (run,), readings)
-
-
-def _reaches_0(estimate: Estimate) -> bool:
-    low, high = estimate.ci95 or (-math.inf, math.inf)
-    return low <= 0 <= high
-
-
 def _warnings(joint: JointFit, estimates: Mapping[str, Estimate]) -> list[str]:
     fit, readings, warnings = joint.fit, joint.readings, []
     every = {**estimates, **joint.negative}
     for name in opposing(fit.model.effects):
         if name in every and every[name].value < 0:
-            reaches = _reaches_0(every[name])
-            why = "its interval reaches 0" if reaches else "an effect is missing in the model"
+            _, high = every[name].ci95 or (-math.inf, math.inf)
+            why = "an effect is missing in the model" if high < 0 else "its interval reaches 0"
             if name in joint.negative:
                 why += "; it is held at 0, and the others are fitted again"
             elif name in OPPOSING:
                 why += "; the model has 0 in its place"
             warnings.append(f"{name} is {every[name].value:.3g}, which is unphysical: {why}")
-    ratio = fit.chi2 / max(fit.degrees, 1)
     if fit.widening > 1:
         warnings.append(
             f"the model does not fit: residuals are {fit.rms / joint.noise:.3g} times the noise; "
             f"errors are {math.sqrt(fit.widening):.2g} times as wide; an effect is missing in the "
             "model"
         )
-    elif ratio < TOO_GOOD and not any(reading.coarse for reading in readings):
-        warnings.append(f"residuals are {math.sqrt(ratio):.2g} times sigma: sigma is too large")
     if not fit.converged:
         warnings.append("the search did not converge")
     # A sensor's tilt is determined by large swings only: its interval is not reported.
@@ -176,65 +122,46 @@ def fit_from_start(
 ) -> tuple[TrajectoryFit, tuple[Reading, ...]]:
     """Return the joint fit to several records, and their readings.
 
-    ``start`` has starting values, by default from zero crossings and the energy of each half swing
-    of the first record; TooShortError is raised if that has too few. If the fit is poor and
-    ``start`` is not a Rig, a second one starts from the methods of peaks, or a global search over
-    their envelope; the better one is returned. Readings whose noise grows with speed are weighted
-    accordingly, unless the model lacks an effect: then weights are equal. Coefficients that are
-    ``held`` are 0; further ``effects`` (SI) begin small if given by name; all their parameters
-    except exponents, orders and widths are fitted.
+    ``start`` has starting values; others are from zero crossings and the energy of each half swing
+    of the first record, and TooShortError is raised if that has too few. Readings whose noise grows
+    with speed are weighted accordingly, unless the model lacks an effect: then weights are equal.
+    Coefficients that are ``held`` are 0; further ``effects`` (SI) begin small if given by name; all
+    their parameters except exponents, orders and widths are fitted.
     """
-    first = runs[0]
-    time, theta = first.time[first.counted], first.angle[first.counted]
-    doubt = max(reading.doubt for reading in readings)
-    names = ["w0", *(name for name in OPPOSING if name not in held)]
     zeros: dict[str, Any] = {name: 0.0 for name in held if "." not in name}
+    model = dataclasses.replace(_start_of(start, runs[0], readings[0].sigma), **zeros)
+    named = [Effect.blank(e, model.units) if isinstance(e, str) else e for e in effects]
+    known = [*model.effects, *named]
     # A sensor on the rod has a bias instead of a zero error.
     zeroed = any(run.rod_sensor is None for run in runs)
-
-    def fitted(begin: Rig | Mapping[str, float] | None) -> TrajectoryFit:
-        model = dataclasses.replace(_start_of(begin, time, theta, readings[0].sigma), **zeros)
-        named = [Effect.blank(e, model.units) if isinstance(e, str) else e for e in effects]
-        known = [*model.effects, *named]
-        if zeroed and OFFSET not in {e.name for e in known}:
-            known.append(Effect(OFFSET, {"d": 0.0}))
-        # Nothing determines the other parameters of an effect that is held at 0.
-        still = {name.partition(".")[0] for name in held}
-        loose = [effect for effect in known if effect.name not in still]
-        sizes = [f"{effect.name}.{size}" for effect in loose for size in effect.sizes]
-        model = dataclasses.replace(model, effects=tuple(e.held(held) for e in known))
-        return fit_runs(runs, model, [*names, *sizes], sigma_doubt=doubt)
-
-    fit = fitted(start)
+    if zeroed and OFFSET not in {e.name for e in known}:
+        known.append(Effect(OFFSET, {"d": 0.0}))
+    # Nothing determines the other parameters of an effect that is held at 0.
+    still = {name.partition(".")[0] for name in held}
+    sizes = [f"{e.name}.{size}" for e in known if e.name not in still for size in e.sizes]
+    model = dataclasses.replace(model, effects=tuple(e.held(held) for e in known))
+    free = ["w0", *(name for name in OPPOSING if name not in held), *sizes]
+    doubt = max(reading.doubt for reading in readings)
+    fit = fit_runs(runs, model, free, sigma_doubt=doubt)
     if fit.widening > LACKING and any(reading.law for reading in readings):
         readings = [dataclasses.replace(r, each=r.alike, law=None) for r in readings]
-        runs = [
-            dataclasses.replace(run, sigma=r.each) for run, r in zip(runs, readings, strict=True)
-        ]
-        fit = fitted(start)
-    poor = not fit.converged or fit.rms > POOR * float(np.std(theta))
-    if isinstance(start, Rig) or not poor:
-        return fit, tuple(readings)
-    try:
-        by_peaks = starting_values(time, theta, sigma=readings[0].sigma)
-        again = fitted(dict(start or {}) | by_peaks)
-    except (FitDiverged, TooShortError):
-        return fit, tuple(readings)
-    better = (again.converged, -again.chi2) > (fit.converged, -fit.chi2)
-    return again if better else fit, tuple(readings)
+        pairs = zip(runs, readings, strict=True)
+        runs = [dataclasses.replace(run, sigma=reading.each) for run, reading in pairs]
+        fit = fit_runs(runs, model, free, sigma_doubt=doubt)
+    return fit, tuple(readings)
 
 
-def _start_of(
-    start: Rig | Mapping[str, float] | None, time: Floats, theta: Floats, sigma: float
-) -> Rig:
+def _start_of(start: Rig | Mapping[str, float] | None, run: FitRun, sigma: float) -> Rig:
     """Return the starting model: given values, and others from the record's half swings."""
     if isinstance(start, Rig):
         return start
-    known: dict[str, Any] = dict(start or {})
+    rough = rough_start(run.time[run.counted], run.angle[run.counted], sigma) or {}
+    known: dict[str, Any] = {**rough, **(start or {})}
     if "w0" not in known:
-        # The methods of peaks also handle rotations.
-        rough = rough_start(time, theta, sigma) or starting_values(time, theta, sigma=sigma)
-        known = rough | known
+        raise TooShortError(
+            "the record must show two half swings or more of a free decay, or a natural frequency "
+            "must be given: w0 = 6.2 under [rig] in experiment.toml"
+        )
     return Rig(**known)
 
 
@@ -253,6 +180,12 @@ class JointFit:
     limits: Mapping[str, float] = dataclasses.field(default_factory=dict)
 
     @property
+    def given(self) -> list[FitRun]:
+        """The runs as they are fitted."""
+        pairs = zip(self.runs, self.readings, strict=True)
+        return [as_fit_run(run, reading) for run, reading in pairs]
+
+    @property
     def noise(self) -> float:
         """Root mean square noise of the included readings, rad."""
         counts = [int(run.trusted.sum()) for run in self.runs]
@@ -263,27 +196,19 @@ class JointFit:
 def fit_together(
     runs: Sequence[Run],
     *,
-    start: Rig | None = None,
-    known: dict[str, float] | None = None,
+    start: Rig | Mapping[str, float] | None = None,
     held: Collection[str] = (),
     effects: Sequence[Effect | str] = (),
 ) -> JointFit:
     """Fit natural frequency, damping, the sensor's zero error and effects to one or more runs.
 
-    Starting values are ``start``, with its effects, or ``known`` parameters, else estimated from
-    the first run; TooShortError is raised if it is too short. Sizes of ``effects`` are fitted;
-    coefficients that are ``held`` are 0.
+    The choices are those of :func:`fit_from_start`.
     """
     if not runs:
         raise InputError("runs must have one record or more, got none")
     readings = [reading_of_run(run) for run in runs]
-    fit, worth = fit_from_start(
-        [as_fit_run(run, reading) for run, reading in zip(runs, readings, strict=True)],
-        readings,
-        start=start or known,
-        held=held,
-        effects=effects,
-    )
+    given = [as_fit_run(run, reading) for run, reading in zip(runs, readings, strict=True)]
+    fit, worth = fit_from_start(given, readings, start=start, held=held, effects=effects)
     return JointFit(fit, tuple(runs), worth)
 
 
@@ -295,7 +220,7 @@ def physical(joint: JointFit) -> JointFit:
     """
     while name := joint.fit.negative:
         known = {**joint.negative, name: joint.fit.estimates[name]}
-        given = [as_fit_run(r, worth) for r, worth in zip(joint.runs, joint.readings, strict=True)]
+        given = joint.given
         try:
             fit, worth = fit_from_start(given, joint.readings, start=joint.fit.model, held=known)
             # An estimate below 0 is wrong by no less than its size.

@@ -1,4 +1,4 @@
-"""De Paula's method: viscous damping from fast swings, friction from slow ones.
+"""Methods that fit straight lines to peaks: the logarithmic decrement, and de Paula's method.
 
 De Paula, Savi & Pereira-Pinto (2006), "Chaos and transient chaos in an experimental nonlinear
 pendulum", J. Sound Vib.; the windows of amplitudes are chosen here.
@@ -11,7 +11,13 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.identification.methods.base import MISFIT, Identification, identified, too_few
+from pendmap.identification.methods.base import (
+    MISFIT,
+    Identification,
+    identified,
+    inapplicable,
+    too_few,
+)
 from pendmap.identification.methods.combined import CUT
 from pendmap.identification.period import frequency
 from pendmap.identification.uncertainty import least_squares_line, propagated
@@ -22,12 +28,68 @@ if TYPE_CHECKING:
 
 
 FAST: Final = (CUT, math.radians(90.0))
-"""Range of amplitudes in which the decay is assumed to be exponential, rad."""
-SLOW: Final = (0.0, CUT)  # Range of amplitudes in which the decay is assumed to be linear, rad
-_FEWEST: Final = 3  # Fewest peaks of each window
+"""Range of amplitudes in which de Paula's decay is assumed to be exponential, rad."""
+SLOW: Final = (0.0, CUT)  # Range of amplitudes in which it is assumed to be linear, rad
+_FEWEST: Final = 3  # Fewest peaks of a line
 
 
-def from_peaks(
+def log_decrement(peaks: Peaks, *, cut: float = CUT) -> Identification:
+    """Identify ``w0`` and ``c_over_m`` by the logarithmic decrement of peaks below ``cut`` (rad).
+
+    ``delta = ln(abs(th_0) / abs(th_n)) / (n pi)`` over ``n`` half cycles between the first and the
+    last peak (the mean of all decrements is equal); ``zeta = delta / sqrt(1 + delta^2)``, ``w0``
+    from the mean period.
+    Coulomb friction is attributed to viscous damping: the decrement increases as the swing decays.
+    """
+    small = peaks.turned
+    small = small.select(np.abs(small.amplitude) < cut)
+    under = "" if math.isinf(cut) else f" under {math.degrees(cut):.3g} degrees"
+    if len(small) < _FEWEST:
+        return too_few(len(small), _FEWEST, len(peaks.turned), under.strip())
+    count, warnings = len(small), []
+    half_cycles = (small.index - small.index[0]).astype(float)
+    size = np.abs(small.amplitude)
+    relative = np.maximum(small.stderr_amplitude, 1e-12) / size
+    decrements, _, misfit = least_squares_line(half_cycles, np.log(size), relative)
+    full = np.flatnonzero(small.index[2:] - small.index[:-2] == 2)  # noqa: PLR2004 (one cycle)
+    if full.size == 0:
+        return inapplicable(f"no two peaks{under} are one cycle apart")
+
+    def compute(values: Floats) -> Floats:
+        logs, times = np.log(values[:count]), values[count:]
+        delta = (logs[0] - logs[-1]) / (half_cycles[-1] * math.pi)
+        period = float(np.mean((times[2:] - times[:-2])[full]))
+        zeta = delta / math.sqrt(1 + delta**2)
+        w0 = 2 * math.pi / (period * math.sqrt(1 - zeta**2))
+        return np.array([w0, 2 * zeta * w0])
+
+    values = np.concatenate((size, small.time))
+    estimates = compute(values)
+    stderr = np.concatenate((small.stderr_amplitude, small.stderr_time))
+    covariance = propagated(compute, values, stderr)
+    if not small.known:
+        misfit = math.nan
+    if misfit > MISFIT:
+        warnings.append(
+            f"the decay is not exponential: chi^2 per degree of freedom is {misfit:.3g} about a "
+            f"straight line of decrement {-decrements[1] / math.pi:.3g}; the errors do not "
+            "include non-viscous damping"
+        )
+    names = ("w0", "c_over_m")
+    return identified(
+        names,
+        estimates,
+        covariance,
+        used=(
+            f"the first and the last of peaks {small.index[0]} to {small.index[-1]} "
+            f"({count}{under}); the mean of {full.size} overlapping periods"
+        ),
+        warnings=warnings,
+        misfit=misfit if small.known else None,
+    )
+
+
+def de_paula(
     peaks: Peaks, *, fast: tuple[float, float] = FAST, slow: tuple[float, float] = SLOW
 ) -> Identification:
     """Identify viscous damping and Coulomb friction separately, each in its own window.
