@@ -80,8 +80,7 @@ def begun(analysis: Callable[..., Any], store: Path | str, share: float = 0.5, *
 
 def small_tiles() -> None:
     """Let tiles of this process be small."""
-    for name in ("basins", "lifetime"):
-        importlib.import_module(f"pendmap.analysis.{name}").TILE = TILE
+    importlib.import_module("pendmap.analysis.basin_tiles").TILE = TILE
 
 
 def assert_same(one: xr.Dataset, other: xr.Dataset) -> None:

@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final, Unpack
 
-import numpy as np
-
 from pendmap import _core
-from pendmap.analysis import along, result, varied
-from pendmap.analysis.basins import choices_of
+from pendmap.analysis import result, varied
+from pendmap.analysis import sweep_table as table
+from pendmap.analysis.basins import RELIABLE, choices_of
 from pendmap.analysis.grid import Grid
 from pendmap.analysis.numerics import Numerics
-from pendmap.analysis.result import Field, Found, Schema, summarised
+from pendmap.analysis.result import Field, Found, Schema
 from pendmap.analysis.run import RunOptions
-from pendmap.analysis.sweeps import report
-from pendmap.analysis.sweeps.branches import branches
-from pendmap.analysis.sweeps.table import sweep_dataset
-from pendmap.analysis.sweeps.tiles import SweepTiles
-from pendmap.errors import InputError, short_repr
+from pendmap.analysis.summary import bound_said, cost, undecided
+from pendmap.analysis.sweep_tiles import PLANES, SweepTiles, branches
+from pendmap.files import facts
+from pendmap.formatting import counted, percent, span
 from pendmap.model import without_dimensions
 from pendmap.units import VELOCITY
 
@@ -33,6 +32,7 @@ if TYPE_CHECKING:
 
 DEFAULT_CELLS: Final = 100  # Default number of cells on each side of a map
 _BYTES: Final = 8  # Memory of a start during the computation
+_LISTED: Final = 8  # Attractors that the summary names
 
 SCHEMA = Schema(
     "basin_sweep",
@@ -42,32 +42,17 @@ SCHEMA = Schema(
     Field("models", "1", "models: values of the parameters"),
     Field("blocks", "1", "blocks of neighbouring models; the first of each was searched alone"),
     Field("cells", "1", "starts of each map"),
-    Field(
-        "attractors",
-        "",
-        "attractors with the ranges in which they exist",
-        read=report.attractors,
-    ),
-    Field("maps", "", "maps, each with its attractors", read=report.maps),
-    Found(
-        "undecided",
-        "1",
-        "share of all starts that no attractor captured",
-        None,
-        variable="undecided_share",
-    ),
-    Found(
-        "failed", "1", "share of all starts that failed or diverged", None, variable="failed_share"
-    ),
-    *along.DRIVE,
+    Field("attractors", "", "attractors, and where they exist", read=table.attractors),
+    Field("maps", "", "maps, each with its attractors", read=table.maps_of),
+    Found("undecided", "1", "share of all starts not captured", variable="undecided_share"),
+    Found("failed", "1", "share of all starts that failed", variable="failed_share"),
+    *varied.DRIVE,
     *result.TIMED,
     Found("reached_error", "1", "largest error after 5 periods that was reached", None),
     *result.END,
     result.SECTION,
     result.TOL.hidden,
-    Field(
-        "layer_periods", "periods", "periods of planes without basins; 0: by default", json=False
-    ),
+    Field("layer_periods", "periods", "of planes without basins; 0: by default", json=False),
     result.SEED.hidden,
     *result.VERSIONS,
     references="Datseris, Luiz Rossi & Wagemakers (2023), Chaos 33, 073151",
@@ -89,18 +74,15 @@ def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     """Map the basins of attraction along one or two parameters, and match the attractors.
 
     Models are mapped in fixed blocks of neighbours, 16 along one parameter and 8 x 8 over two. The
-    first model of a block is searched as by :func:`pendmap.basins`. Each further one starts from
-    its neighbour's attractors, followed by Newton's method; then the same sample of starts is
-    searched for others, and all starts that end undecided begin further searches. Only chaos is
-    confirmed by fewer runs than in a map alone (16 instead of 256; 64 starts where it attracted
-    everything).
+    first model of a block is searched as by :func:`pendmap.basins`, each further one from its
+    neighbour's attractors too. Only chaos is confirmed by fewer runs than in a map alone (16
+    instead of 256; 64 starts where it attracted everything).
 
     Then attractors are matched between neighbours along both parameters. Orbits are one where
-    Newton's method leads from each to the other, in halved steps where a whole one fails, without a
-    change of symmetry; those left are matched by least distance, if their turns and their symmetry
-    are equal: chaos, and what an orbit becomes where its period doubles. So an attractor has one
-    number in the whole sweep, in the order of first appearance along rising parameters. Mirror
-    images stay two attractors.
+    Newton's method leads from each to the other without a change of symmetry; those left are
+    matched by least distance, if their turns and their symmetry are equal: chaos, and what an orbit
+    becomes where its period doubles. So an attractor has one number in the whole sweep, in the
+    order of first appearance along rising parameters. Mirror images stay two attractors.
 
     Parameters
     ----------
@@ -126,13 +108,11 @@ def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
         Over the parameters and ``attractor``: ``fraction`` of the starts (0 where it does not
         exist) with ``stderr``, ``exists``, ``kind``, ``n``, ``w``, ``exponent`` with
         ``exponent_stderr``, and a stroboscopic point, ``theta_point`` and ``velocity_point``. Over
-        the parameters: ``plane``, ``attractors`` (how many), ``basin_entropy``,
-        ``boundary_basin_entropy`` with its standard error, ``uncertainty_exponent`` of the labels
-        on the grid (:func:`pendmap.uncertainty_exponent`) with its standard error, ``undecided``,
-        ``failed``, ``steps_per_period``, ``max_periods``, and for the first map of a block
-        ``unreliable``. ``label`` over the parameters, velocity and theta has the number of the
-        attractor. ``twin`` over ``attractor`` is the number of the mirror image. All points of the
-        attractors, of chaos at most 128, are over ``point``.
+        the parameters: ``plane``, ``attractors`` (how many), the measures of a map, and for the
+        first map of a block ``unreliable``; ``uncertainty_exponent`` is that of the labels on the
+        grid (:func:`pendmap.uncertainty_exponent`). ``label`` over the parameters, velocity and
+        theta has the number of the attractor. ``twin`` over ``attractor`` is the number of the
+        mirror image. All points of the attractors, of chaos at most 128, are over ``point``.
 
     Raises
     ------
@@ -154,57 +134,66 @@ def sweep(  # noqa: PLR0913 (numerical choices, all with defaults that serve)
     >>> result.exists.sel(attractor="rotation 1:+1").values
     array([0, 1, 1, 1], dtype=int8)
     """
-    if not isinstance(ranges, Mapping) or len(ranges) not in {1, 2}:
-        given = ", ".join(map(str, ranges)) if isinstance(ranges, Mapping) else short_repr(ranges)
-        raise InputError(
-            "ranges must have one or two parameters, like {'p': (0.5, 2.0, 25)}, or on the command "
-            f"line --p 0.5:2:25; got {given or 'nothing'}"
-        )
     pendulum = varied.having(pendulum, ranges)
     bare, units = without_dimensions(pendulum)
-    axes = varied.varied(pendulum, ranges, len(ranges))
+    count = 2 if isinstance(ranges, Mapping) and len(ranges) > 1 else 1
+    axes = varied.varied(pendulum, ranges, count)
     grid = Grid.of(grid, DEFAULT_CELLS, units.given(1.0, VELOCITY))
     run = RunOptions.of(run, options)
     numerics = Numerics(run, tol, max_periods)
     choices = choices_of(numerics, layer_periods, check=check)
     job = SweepTiles(bare, tuple(axis.kernel for axis in axes), grid.bare(units), choices)
-    job = job.on(*run.tiles(job.blocks))
-    models = math.prod(job.shape)
+    blocks, models = math.prod(job.blocks), math.prod(job.shape)
+    threads, at_once = run.tiles(blocks)
+    job = dataclasses.replace(job, threads=threads, at_once=at_once)
     _core.reckon("starts", models * grid.cells, _BYTES)
 
     def compute(work: Work) -> xr.Dataset:
         maps = job.run(work)
         numbers = branches(job, maps)
-        label = np.zeros((*job.shape, grid.velocity.count, grid.theta.count), dtype=np.int16)
-        for place, one in job.labels(work.store):
-            moved = np.array([-1, 0, *(k + 1 for k in numbers[place])], dtype=np.int16)
-            label[place] = moved[one + 1].reshape(label.shape[-2:])
-        dataset = sweep_dataset(maps, numbers, axes, grid, units, label)
+        label = job.labels(work.store, numbers)
+        dataset = table.sweep_dataset(maps, numbers, axes, grid, units, label)
         values = {
             **numerics.provenance(),
-            **along.kept(pendulum, axes),
             "analysis": "basins",
             "varied": " ".join(axis.name for axis in axes),
             "models": models,
-            "blocks": job.blocks,
+            "blocks": blocks,
             "cells": grid.cells,
             "layer_periods": layer_periods or 0,
-            "undecided": float(dataset["undecided"].mean()),
-            "failed": float(dataset["failed"].mean()),
+            **{key: float(dataset[key].mean()) for key in ("undecided", "failed")},
             "reached_error": float(dataset["step_error"].max()),
         }
-        replaced = [name for axis in axes for name in axis.replaced]
-        SCHEMA.complete(dataset, pendulum, values, None, replaced)
-        dataset.attrs["title"] = varied.title(pendulum, *axes)
-        lines = [*report.summary(dataset), *varied.remarks(pendulum, *axes)]
-        summarised(dataset, lines, pendulum, "basins are")
+        varied.complete(
+            *(SCHEMA, dataset, pendulum, axes, values), summary=_summary, what="basins are"
+        )
         return dataset
 
-    request = {
-        **numerics.request,
-        "ranges": varied.requested(axes, ranges),
-        "grid": grid,
-        "layer_periods": layer_periods,
-        "check": check,
-    }
+    request = {"ranges": [axis.request for axis in axes], **numerics.request}
+    request |= {"grid": grid, "layer_periods": layer_periods, "check": check}
     return run.complete("sweep", pendulum, request, job, compute)
+
+
+def _summary(dataset: xr.Dataset) -> list[str]:
+    """Return the findings, a sentence a line."""
+    a, every = facts(dataset), table.attractors(dataset)
+    spans = [span(dim, *dataset[dim].values[[0, -1]]) for dim in table.varied_names(dataset)]
+    counts = f"{counted(a['models'], 'map')} of {counted(a['cells'], 'start')}"
+    lines = [f"{', '.join(spans)}: {counts}, {counted(len(every), 'attractor')}."]
+    for one in sorted(every, key=lambda one: -one["largest_fraction"])[:_LISTED]:
+        ends = ", ".join(span(dim, *limits) for dim, limits in one["ranges"].items())
+        share = percent(100 * one["largest_fraction"])
+        bound = bound_said(one["largest_fraction"], a["cells"])
+        lines.append(f"{one['name']}: {ends}, up to {share} of the starts{bound}.")
+    if len(every) > _LISTED:
+        lines.append(f"{len(every) - _LISTED} more attractors are in the result.")
+    chaos = int((dataset["plane"].values == PLANES.index("only_chaos")).sum())
+    if chaos:
+        lines.append(f"Chaos attracts every start in {counted(chaos, 'map')}.")
+    changed = dataset["unreliable"].max().item()
+    if changed > RELIABLE:
+        lines.append(
+            "LABELS OF SINGLE CELLS ARE NOT RELIABLE IN SOME MAPS (half the step or mirroring "
+            f"changes up to {percent(100 * changed)}): read the shares."
+        )
+    return [*lines, *undecided(a, ending="_share"), f"Largest {cost(a)}"]

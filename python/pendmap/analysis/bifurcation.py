@@ -7,20 +7,15 @@ from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 import xarray as xr
-from scipy.ndimage import find_objects, label
 
-from pendmap.analysis import along, cell_search, result, varied
+from pendmap.analysis import cell_search, result, varied
 from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.orbit_table import attractors_of, matched
-from pendmap.analysis.result import Field, Schema, point, rows, summarised
+from pendmap.analysis.result import Field, Schema, point, rows
 from pendmap.analysis.run import RunOptions
-from pendmap.analysis.summary import box_said
-from pendmap.analysis.survey_tiles import SurveyTiles
-from pendmap.errors import InputError, check_number, core_errors, short_repr
-from pendmap.files import facts
+from pendmap.errors import InputError, check_number, short_repr
 from pendmap.files.variables import variable
-from pendmap.formatting import counted
-from pendmap.model import without_dimensions
+from pendmap.formatting import counted, span
 from pendmap.units import VELOCITY
 
 if TYPE_CHECKING:
@@ -29,17 +24,15 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from pendmap import _core
-    from pendmap.analysis.along import Varied
     from pendmap.analysis.grid import Grid
     from pendmap.analysis.run import Keywords
-    from pendmap.engine import Work
+    from pendmap.analysis.varied import Varied
     from pendmap.model import Pendulum, Rig
-    from pendmap.signal import Floats, Mask
+    from pendmap.signal import Floats
     from pendmap.units import Units
 
 
-_SAME = 1e-4  # Distance, rad and units of velocity, below which points of orbits are equal
-_NEAR = 0.3  # Distance, same units, below which neighbouring attractors may belong to one branch
+_NEAR = 0.3  # Distance, rad and units of velocity, below which neighbours may be one branch
 _LISTED = 12  # Largest number of branches in a summary
 
 
@@ -82,9 +75,8 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     starts and from the attractors at neighbouring values. In addition, one motion is followed as
     the parameter rises in steps, and one as it falls: at each value it continues from its last
     state, displaced by 1e-6, until it is on an attractor, for as long as the attractor with the
-    smallest exponent there needs to shrink what decays to exp(-200). Where both have arrived and
-    the two differ there is hysteresis, unless they differ at all values because each stays on the
-    attractor on which it begins; where one has not arrived, the summary says so.
+    smallest exponent there needs to shrink what decays to exp(-200). Where the two differ there is
+    hysteresis, unless they differ at all values because each stays where it begins.
 
     Attractors at neighbouring values with the same kind, period and winding and with points near
     one another make a branch. At a bifurcation one branch ends and others begin.
@@ -129,70 +121,51 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     ['bound', 'branch', 'entry', 'kind', 'p', 'point']
     """
     pendulum = varied.having(pendulum, ranges)
-    bare, units = without_dimensions(pendulum)
     (axis,) = varied.varied(pendulum, ranges, 1)
-    run = RunOptions.of(run, options)
-    numerics = Numerics(run, tol, max_periods)
-    search = cell_search.CellSearch(starts, box, numerics)
-    first = None
+    units, first = pendulum.units, None
     if start is not None:
         if np.asarray(start, dtype=object).shape != (2,):
             raise InputError(f"start must be (angle, velocity), got {short_repr(start)}")
         angle, speed = (check_number("start", part) for part in start)
         first = (angle, units.bare(speed, VELOCITY))
-    limits = (numerics.tol, numerics.max_periods)
-    job = SurveyTiles(bare, (axis.kernel,), search.initial(units), limits)
+    numerics = Numerics(RunOptions.of(run, options), tol, max_periods)
+    search = cell_search.CellSearch(pendulum, (axis,), starts, box, numerics)
 
-    def compute(work: Work) -> xr.Dataset:
-        with core_errors():
-            survey, blocks = job.run(work, run)
-            raw = survey.diagram(blocks, first)
+    def make(survey: _core.Survey, blocks: list[bytes]) -> cell_search.Made:
+        raw = survey.diagram(blocks, first)
         dataset = _dataset(raw, axis, units)
-        values = {
-            **search.attributes(raw, units),
-            **along.kept(pendulum, (axis,)),
-            "varied": axis.name,
-            "points": dataset.sizes["point"],
-        }
-        SCHEMA.complete(dataset, pendulum, values, raw, axis.replaced)
-        dataset.attrs["title"] = varied.title(pendulum, axis)
-        lines = [*_summary(dataset), *varied.remarks(pendulum, axis)]
-        summarised(dataset, lines, pendulum, "attractors are")
-        return dataset
+        return raw, dataset, {"varied": axis.name, "points": dataset.sizes["point"]}
 
-    request = {"ranges": varied.requested([axis], ranges), "start": start, **search.request}
-    return run.complete("bifurcation", pendulum, request, job, compute)
+    return search.result(SCHEMA, make, _summary, {"start": start})
 
 
 def _dataset(raw: _core.Bifurcation, axis: Varied, units: Units) -> xr.Dataset:
-    kinds = cell_search.names(raw)
-    of_entry, members = _linked(raw, axis.values.size)
-    owner = raw.point_entry
-    value = axis.values[raw.cell]
+    branch, owner, value = _linked(raw, axis.values.size), raw.point_entry, axis.values[raw.cell]
     speed = units.given(raw.point_velocity, VELOCITY)
-    ends = np.array([[branch[0], branch[-1]] for branch in members], dtype=np.intp).reshape(-1, 2)
+    _, first = np.unique(branch, return_index=True)
+    last = branch.size - 1 - np.unique(branch[::-1], return_index=True)[1]
     loose = {
         key: np.concatenate([getattr(raw.up, key), getattr(raw.down, key)])
         for key in ("value", "theta", "velocity")
     }
     speeds = units.given(loose["velocity"], VELOCITY)
     way = np.repeat([1, -1], [raw.up.value.size, raw.down.value.size])
-    kind, meanings = raw.kind[ends[:, 0]], dict(enumerate(kinds))
+    kind, meanings = raw.kind[first], {k: one.name for k, one in enumerate(raw.kinds)}
     on = "entry of the attractor that the sweep {} is on"
     data: dict[str, Any] = {
-        **cell_search.entries(raw, units),
+        **cell_search.variables(raw, (axis.name,), axis.values.shape, units),
+        "entry": variable("entry", np.arange(value.size), "1", "number of the entry"),
         "entry_value": ("entry", value, axis.attributes),
-        "entry_branch": variable("entry", of_entry, "1", "number of the branch"),
+        "entry_branch": variable("entry", branch, "1", "number of the branch"),
         "branch_kind": variable("branch", kind, "", "kind of attractor", flags=meanings),
-        "branch_w": variable("branch", raw.w[ends[:, 0]], "turns", "net turns w over a period"),
-        "branch_first": ("branch", value[ends[:, 0]], axis.attributes),
-        "branch_last": ("branch", value[ends[:, 1]], axis.attributes),
+        "branch_w": variable("branch", raw.w[first], "turns", "net turns w over a period"),
+        "branch_first": ("branch", value[first], axis.attributes),
+        "branch_last": ("branch", value[last], axis.attributes),
         "point_entry": variable("point", owner, "1", "entry of the attractor"),
         "point_value": ("point", value[owner], axis.attributes),
         **point("point", raw.point_theta, speed, units.of_velocity, "point_{}"),
         "up": variable(axis.name, raw.up.on, "1", on.format("up"), "-1: none", missing=-1),
         "down": variable(axis.name, raw.down.on, "1", on.format("down"), "-1: none", missing=-1),
-        **cell_search.shares(raw, (axis.name,), axis.values.shape),
     }
     if way.size:  # a table of an empty dimension has no rows
         data |= {
@@ -200,23 +173,16 @@ def _dataset(raw: _core.Bifurcation, axis: Varied, units: Units) -> xr.Dataset:
             "loose_value": ("loose", axis.values[loose["value"]], axis.attributes),
             **point("loose", loose["theta"], speeds, units.of_velocity, "loose_{}"),
         }
-    coordinates = {
-        **axis.coordinates,
-        "kind": variable("kind", np.array(kinds, dtype=str), long_name="kind of attractor"),
-        "entry": variable("entry", np.arange(raw.kind.size), "1", "number of the entry"),
-    }
-    return xr.Dataset(data, coords=coordinates)
+    return xr.Dataset(data, coords=axis.coordinates)
 
 
 def _summary(dataset: xr.Dataset) -> list[str]:
-    a = facts(dataset)
-    name = a["varied"]
+    name, count = dataset.attrs["varied"], dataset.sizes["branch"]
     values = dataset[name].values
-    count = dataset.sizes["branch"]
     joined = counted(count, "branch", "branches")
-    lines = [
-        f"{name} = {values[0]:g} to {values[-1]:g}: {counted(values.size, 'value')}, {joined}."
-    ]
+    lines = [f"{span(name, *values[[0, -1]])}: {counted(values.size, 'value')}, {joined}."]
+    if not count:
+        return [*lines, "No attractor was found."]
     first, last = dataset["branch_first"].values, dataset["branch_last"].values
     longest = np.argsort(-(last - first), kind="stable")[:_LISTED]
     for k in sorted(longest, key=lambda k: (first[k], last[k])):
@@ -224,84 +190,46 @@ def _summary(dataset: xr.Dataset) -> list[str]:
         lines.append(f"{kind}: {name} = {first[k]:.6g} to {last[k]:.6g}.")
     if count > _LISTED:
         lines.append(f"{count - _LISTED} shorter branches are in the result.")
-    lines += _hysteresis(dataset, name) if count else ["No attractor was found."]
-    lines.append(cell_search.missed(a, values.size, "value"))
-    lines += [*cell_search.chaos(a), *cell_search.undecided(a)]
-    where = dataset["undecided"].values > 0
-    if where.any():
-        lines.append(f"Undecided starts are at {name} = {_spans(values, where)}.")
-    lines.append(
-        f"{counted(a['starts'], 'start')} a value, {box_said(a)}; {counted(a['points'], 'point')}; "
-        f"error after 5 periods {a['reached_error']:.2g}; {a['seconds']:.1f} s on "
-        f"{counted(a['threads'], 'thread')}."
-    )
-    return lines
+    return [*lines, *_hysteresis(dataset, values)]
 
 
-def _hysteresis(dataset: xr.Dataset, name: str) -> list[str]:
+def _hysteresis(dataset: xr.Dataset, values: Floats) -> list[str]:
     """Return summary lines on the values at which the sweeps are on different attractors."""
-    up, down, values = dataset["up"].values, dataset["down"].values, dataset[name].values
-    pairs = np.array([one.pair for one in attractors_of(dataset, "kind_")], dtype=str)
-    kind = pairs[dataset["entry_kind"].values]
-    arrived = (up >= 0) & (down >= 0)
-    differ = arrived & (kind[up] != kind[down])
-    where = "everywhere" if arrived.all() else "wherever both have arrived"
-    lines = [f"Up and down are on the same kinds of attractor {where}."]
-    if differ[arrived].all() and arrived.any():
-        lines = [f"Up and down are on different kinds of attractor {where}, as they begin."]
-    elif differ.any():
-        lines = [f"Up and down differ at {name} = {_spans(values, differ)}: hysteresis."]
-    if not arrived.all():
-        late = _spans(values, ~arrived)
-        lines.append(f"A sweep has arrived on no attractor at {name} = {late}: no difference.")
-    others = arrived & ~differ & (up != down)
-    if others.any():
-        images = all(_mirrored(dataset, up[k], down[k]) for k in np.flatnonzero(others))
-        which = "mirror images of one another" if images else "different attractors of one kind"
-        lines.append(f"They are on {which} at {name} = {_spans(values, others)}.")
-    return lines
-
-
-def _spans(values: Floats, where: Mask) -> str:
-    """Return the three widest ranges of the marked values, as text."""
-    every = [(place.start, place.stop - 1) for (place,) in find_objects(label(where)[0])]
-    spans = sorted(every, key=lambda s: s[0] - s[1])[:3]
-    text = ", ".join(
-        f"{values[i]:.4g} to {values[j]:.4g}" if j > i else f"{values[i]:.4g}"
-        for i, j in sorted(spans)
+    up, down, name = dataset["up"].values, dataset["down"].values, dataset.attrs["varied"]
+    every, kind = attractors_of(dataset, "kind_"), dataset["entry_kind"].values
+    pair, single = (
+        np.array([getattr(one, key) for one in every], dtype=str)[kind] for key in ("pair", "name")
     )
-    return text + (" and less" if len(every) > len(spans) else "")
+    arrived = (up >= 0) & (down >= 0)
+    differ = arrived & (pair[up] != pair[down])
+    images = arrived & ~differ & (single[up] != single[down])
+    others = arrived & ~differ & ~images & (up != down)
+    hysteresis = "" if differ[arrived].all() else ", with hysteresis,"
+    lines = []
+    for marked, text in (
+        (differ, f"on different kinds of attractor{hysteresis}"),
+        (images, "on mirror images of one another"),
+        (others, "on different attractors of one kind"),
+        (~arrived, "not both on an attractor"),
+    ):
+        if marked.any():
+            ends = span(name, *values[np.flatnonzero(marked)[[0, -1]]])
+            some = "" if marked.all() else f", {counted(int(marked.sum()), 'value')}"
+            lines.append(f"Up and down are {text} at {ends}{some}.")
+    return lines or ["Up and down are on the same attractors everywhere."]
 
 
-def _mirrored(dataset: xr.Dataset, one: int, other: int) -> bool:
-    """Return whether two attractors are mirror images: orbits by a point, chaos by its sense."""
-    n, w = dataset["entry_n"].values, dataset["entry_w"].values
-    if n[one] != n[other] or w[one] != -w[other]:
-        return False
-    if n[one] == 0:
-        return bool(w[one] != 0)
-    # Points are sorted by attractor.
-    owner = dataset["point_entry"].values
-    first, there = (slice(*np.searchsorted(owner, (k, k + 1))) for k in (one, other))
-    theta, velocity = dataset["point_theta"].values, dataset["point_velocity"].values
-    apart = np.abs(np.exp(1j * theta[there]) - np.exp(-1j * theta[first][0]))
-    apart += np.abs(velocity[there] + velocity[first][0])
-    return bool(apart.min() < _SAME)
-
-
-def _linked(raw: _core.Bifurcation, values: int) -> tuple[NDArray[np.int32], list[list[int]]]:
-    """Return the branch of each entry, and the entries of each branch, value by value.
+def _linked(raw: _core.Bifurcation, values: int) -> NDArray[np.int32]:
+    """Return the branch of each entry.
 
     Orbits near one another and chaos of one kind are one branch, if they have equal turns.
     """
-    cell = raw.cell
-    bounds = np.searchsorted(cell, np.arange(values + 1))
+    bounds = np.searchsorted(raw.cell, np.arange(values + 1)).tolist()
     plane = np.stack([raw.point_theta, raw.point_velocity], axis=1)
-    points = np.split(plane, np.searchsorted(raw.point_entry, np.arange(1, cell.size)))
-    kind = np.array([one.kind for one in raw.kinds], dtype=str)[raw.kind]
-    key = list(zip(kind.tolist(), raw.n.tolist(), raw.w.tolist(), strict=True))
-    of_entry = np.full(cell.size, -1, dtype=np.int32)
-    members: list[list[int]] = []
+    points = np.split(plane, np.searchsorted(raw.point_entry, np.arange(1, raw.cell.size)))
+    kind = [raw.kinds[k].kind for k in raw.kind.tolist()]
+    key = list(zip(kind, raw.n.tolist(), raw.w.tolist(), strict=True))
+    branch = np.full(raw.cell.size, -1, dtype=np.int32)
     for value in range(values):
         low, high = bounds[value : value + 2]
         begin = bounds[max(value - 1, 0)]
@@ -312,10 +240,7 @@ def _linked(raw: _core.Bifurcation, values: int) -> tuple[NDArray[np.int32], lis
             return _NEAR if raw.n[low + b] else math.inf
 
         for _, _, a, b in matched(points[begin:low], points[low:high], reach):
-            of_entry[low + b] = of_entry[begin + a]
-            members[of_entry[begin + a]].append(low + b)
-        for b in range(low, high):
-            if of_entry[b] < 0:
-                of_entry[b] = len(members)
-                members.append([b])
-    return of_entry, members
+            branch[low + b] = branch[begin + a]
+        new = np.flatnonzero(branch[low:high] < 0)
+        branch[low + new] = branch.max(initial=-1) + 1 + np.arange(new.size)
+    return branch

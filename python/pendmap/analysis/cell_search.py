@@ -1,46 +1,74 @@
-"""Search for attractors in each of many models: what it is asked, and what it found."""
+"""Search for attractors in each of many models: over two parameters, or along one.
+
+Its tiles are blocks of 16 x 16 cells. In the step ``search-0`` each block is searched on its own.
+Each step ``search-N`` searches cells again from attractors of cells nearby that they lack, and
+reads only what the step before has found in the block and in those around it; the last one gains
+nothing.
+"""
 
 from __future__ import annotations
 
 import dataclasses
-import itertools
-from collections import Counter
-from typing import TYPE_CHECKING, Any
+import functools
+import pickle
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from scipy.ndimage import find_objects, label
 
-from pendmap.analysis import result
-from pendmap.analysis.along import DRIVE
+from pendmap import _core
+from pendmap.analysis import result, varied
 from pendmap.analysis.grid import Grid
 from pendmap.analysis.orbit_table import DESCRIBED, described
-from pendmap.analysis.result import Field, Found, point
-from pendmap.errors import (
-    MOST_CELLS,
-    check_type,
-    check_whole,
-)
+from pendmap.analysis.result import Field, Found
+from pendmap.analysis.summary import cost, undecided, window_said
+from pendmap.errors import MOST_CELLS, check_type, check_whole, core_errors
+from pendmap.files import facts
 from pendmap.files.variables import variable
 from pendmap.formatting import counted, percent
-from pendmap.units import RATE, VELOCITY
+from pendmap.model import without_dimensions
+from pendmap.units import RATE, VELOCITY, Units
 
 if TYPE_CHECKING:
-    from collections.abc import Hashable, Mapping
+    from collections.abc import Callable, Hashable, Mapping, Sequence
 
     import xarray as xr
-    from numpy.typing import NDArray
 
-    from pendmap import _core
     from pendmap.analysis.numerics import Numerics
+    from pendmap.analysis.result import Schema
+    from pendmap.analysis.run import RunOptions
+    from pendmap.engine import Store, Work
+    from pendmap.model import Pendulum, Rig
     from pendmap.signal import Floats
-    from pendmap.units import Units
 
-CHAOS_PERIODS = ("time for which the chaos was not captured", "0: no chaos")  # Name, comment
-_SPREAD = 1000  # Cells on each side of the default box, without effect
-_PLASTIC = 1.324717957244746
-"""Plastic number, whose powers give an even additive recurrence in two dimensions."""
-_CELLS = 61  # Cells after which initial conditions repeat: a prime, so that columns differ too
-UNDECIDED = "undecided"  # Kind of a cell in which no attractor was found
+    Made = tuple[_core.ParameterMap, xr.Dataset, dict[str, Any]]
+    """The core's result, the dataset, facts."""
+
+UNDECIDED: Final = "undecided"  # Kind of a cell in which no attractor was found
+_SPREAD: Final = 1000  # Cells on each side of the default box, without effect
+_PLASTIC: Final = 1.324717957244746  # Its powers give an even additive recurrence in the plane
+_CELLS: Final = 61  # Cells after which starts repeat: a prime, so that columns differ too
+_STEP: Final = "search-"  # Beginning of the names of steps
+_GAINED: Final = {False: b"-", True: b"+"}
+"""First byte of a record: whether a cell has gained an attractor; alone if nothing changed."""
+
+SEARCH: Final = (
+    Field("starts", "1", "initial conditions of each pendulum"),
+    Found("missed", "1", "share of the box that all starts of a cell miss at a chance of 5 %"),
+    Found("undecided", "1", "share of the starts not captured", variable="undecided_share"),
+    Found("failed", "1", "share of the starts that failed or diverged", variable="failed_share"),
+    Found("chaos_periods", "periods", "least; 0: no chaos", variable="least_chaos_periods"),
+    *varied.DRIVE,
+    *result.TIMED,
+    result.REACHED,
+    *result.END,
+    result.SECTION,
+    *result.BOX,
+    result.TOL.hidden,
+    Found("searched_again", "1", "cells searched again for attractors of a neighbour", json=False),
+    result.SEED.hidden,
+    *result.VERSIONS,
+)
+"""Fields of a search for attractors in many pendulums."""
 
 
 def spread(grid: Grid, count: int, seed: int = 0) -> tuple[Floats, ...]:
@@ -54,173 +82,174 @@ def spread(grid: Grid, count: int, seed: int = 0) -> tuple[Floats, ...]:
     return theta, velocity
 
 
-@dataclasses.dataclass(frozen=True)
 class CellSearch:
-    """Starts of the search for attractors in each of many pendulums, checked."""
+    """A search in each model along one or two axes, in a box, by default that of basins."""
 
-    starts: int
-    box: Grid | None
-    numerics: Numerics
+    def __init__(
+        self,
+        model: Pendulum | Rig,
+        axes: Sequence[varied.Varied],
+        starts: int,
+        box: Grid | None,
+        numerics: Numerics,
+    ) -> None:
+        self.model, self.axes, self.numerics = model, axes, numerics
+        self.starts = check_whole("starts", starts, 1, MOST_CELLS)
+        self.box = Grid.square(_SPREAD, model.units.given(1.0, VELOCITY)) if box is None else box
+        check_type("box", self.box, Grid, "Grid.square(100)")
 
-    def __post_init__(self) -> None:
-        check_whole("starts", self.starts, 1, MOST_CELLS)
-        if self.box is not None:
-            check_type("box", self.box, Grid, "Grid.square(100)")
+    def result(
+        self,
+        schema: Schema,
+        make: Callable[[_core.Survey, list[bytes]], Made],
+        summary: Callable[[xr.Dataset], list[str]],
+        request: Mapping[str, Any],
+    ) -> xr.Dataset:
+        """Return the result that ``make`` makes of the blocks; ``request`` has more arguments."""
+        bare, units = without_dimensions(self.model)
+        numerics, run = self.numerics, self.numerics.run
+        theta, velocity = spread(self.box, _CELLS * self.starts, run.seed)
+        initial = theta, units.bare(velocity, VELOCITY), self.starts
+        limits = numerics.tol, numerics.max_periods
+        job = _Blocks(bare, tuple(axis.kernel for axis in self.axes), initial, limits)
 
-    @property
-    def request(self) -> dict[str, Any]:
-        """The arguments that determine the search."""
-        return {"starts": self.starts, "box": self.box, **self.numerics.request}
+        def compute(work: Work) -> xr.Dataset:
+            with core_errors():
+                raw, dataset, values = make(*job.run(work, run))
+            values |= {
+                **numerics.provenance(),
+                **self.box.attributes,
+                "starts": self.starts,
+                "missed": result.missed(self.starts),
+                "undecided": float(raw.undecided.mean()),
+                "chaos_periods": min((int(n) for n in raw.chaos_periods if n), default=0),
+                "failed": float(raw.failed.mean()),
+            }
+            varied.complete(
+                *(schema, dataset, self.model, self.axes, values, raw),
+                summary=lambda one: [*summary(one), *self._findings(one)],
+                what="attractors are",
+            )
+            return dataset
 
-    def within(self, units: Units) -> Grid:
-        """Return the box, in these units; by default that of :func:`pendmap.basins`."""
-        return self.box or Grid.square(_SPREAD, units.given(1.0, VELOCITY))
+        arguments = {"ranges": [axis.request for axis in self.axes], **numerics.request, **request}
+        arguments |= {"starts": self.starts, "box": self.box}
+        return run.complete(schema.kind, self.model, arguments, job, compute)
 
-    def initial(self, units: Units) -> tuple[Floats, Floats, int]:
-        """Return initial conditions without dimensions, and how many of them each cell takes."""
-        theta, velocity = spread(self.within(units), _CELLS * self.starts, self.numerics.run.seed)
-        return theta, units.bare(velocity, VELOCITY), self.starts
-
-    def attributes(self, raw: _core.ParameterMap, units: Units) -> dict[str, Any]:
-        """Return the attributes of the search whose result is ``raw``."""
-        return {
-            **self.numerics.provenance(),
-            **self.within(units).attributes,
-            "starts": self.starts,
-            "missed": result.missed(self.starts),
-            "undecided": float(raw.undecided.mean()),
-            "chaos_periods": min((int(n) for n in raw.chaos_periods if n), default=0),
-            "failed": float(raw.failed.mean()),
-        }
-
-
-def undecided_cells(dataset: xr.Dataset) -> list[dict[str, Any]]:
-    """Return groups of touching cells with undecided starts, the largest first."""
-    share = dataset["undecided"]
-    groups, _ = label(share.values > 0, structure=np.ones((3,) * share.ndim))
-    regions = []
-    for number, box in enumerate(find_objects(groups), 1):
-        mine = groups == number
-        ranges = {
-            str(name): (float(dataset[name].values[at][0]), float(dataset[name].values[at][-1]))
-            for name, at in zip(reversed(share.dims), reversed(box), strict=True)
-        }
-        mean = float(share.values[mine].mean())
-        regions.append({"ranges": ranges, "cells": int(mine.sum()), "undecided": mean})
-    return sorted(regions, key=lambda one: -one["cells"])
-
-
-def regimes(
-    raw: _core.ParameterMap, cells: int
-) -> tuple[list[tuple[int, ...]], NDArray[np.int16], Floats]:
-    """Return the sets of kinds, the most frequent first; the set of each cell; their shares."""
-    bounds = np.searchsorted(raw.cell, np.arange(cells + 1))
-    of_cell = [
-        tuple(np.unique(raw.kind[low:high]).tolist()) for low, high in itertools.pairwise(bounds)
-    ]
-    count = Counter(of_cell)
-    # Those without any attractor are the last of equally frequent ones.
-    sets = sorted(count, key=lambda one: (-count[one], one or (len(raw.kinds),)))
-    place = {one: k for k, one in enumerate(sets)}
-    share = np.array([count[one] / cells for one in sets])
-    return sets, np.array([place[one] for one in of_cell], dtype=np.int16), share
-
-
-def names(raw: _core.ParameterMap) -> list[str]:
-    """Return the names of all kinds of attractor, rest first, chaos last."""
-    return [one.name for one in raw.kinds]
+    def _findings(self, dataset: xr.Dataset) -> list[str]:
+        """Return summary lines on what the starts may have missed, chaos, undecided starts."""
+        a, box = facts(dataset), self.box
+        cells, cell = dataset["undecided"].size, "value" if len(self.axes) == 1 else "cell"
+        one, every = (percent(100 * result.missed(n * self.starts)) for n in (1, cells))
+        starts = f"{counted(self.starts, 'start')} a {cell}"
+        lines = [f"{starts} may miss attractors with {one} of the box, all with {every} (95 %)."]
+        if a["least_chaos_periods"]:
+            periods = counted(a["least_chaos_periods"], "period")
+            lines.append(
+                f"Chaos: not captured within {periods}; a longer transient looks the same."
+            )
+        window = window_said(box.theta.as_tuple, box.velocity.as_tuple, Units.of(a))
+        return [*lines, *undecided(a, ending="_share"), f"The box is {window}; {cost(a)}"]
 
 
-def entries(raw: _core.ParameterMap, units: Units) -> dict[str, Any]:
-    """Return all attractors, each with the index of its kind, over ``entry``."""
-    one, rate, speed = "entry", units.of_rate, units.of_velocity
+def variables(
+    raw: _core.ParameterMap, dims: tuple[Hashable, ...], shape: tuple[int, ...], units: Units
+) -> dict[str, Any]:
+    """Return shares of starts over ``dims``, all kinds, and all attractors over ``entry``."""
+    one, rate = "entry", units.of_rate
     velocity = units.given(raw.velocity, VELOCITY)
     growth, error = (units.given(values, RATE) for values in (raw.exponent, raw.exponent_stderr))
-    place, meanings = "cell of the whole result, row by row", dict(enumerate(names(raw)))
+    lost, failed, watched = (
+        values.reshape(shape) for values in (raw.undecided, raw.failed, raw.chaos_periods)
+    )
+    names = [kind.name for kind in raw.kinds]
+    place, chaos = "cell of the whole result, row by row", "time for which chaos was not captured"
+    kind = variable(one, raw.kind, "", "kind of attractor", flags=dict(enumerate(names)))
     return {
+        "undecided": variable(dims, lost, "1", "share of the starts that no attractor captured"),
+        "failed": variable(dims, failed, "1", "share of the starts that failed or diverged"),
+        "chaos_periods": variable(dims, watched, "periods", chaos, "0: no chaos"),
+        "kind": variable("kind", np.array(names, dtype=str), long_name="kind of attractor"),
         **described(raw.kinds, "kind", "kind_"),
         "entry_cell": variable(one, raw.cell, "1", place),
-        "entry_kind": variable(one, raw.kind, "", "kind of attractor", flags=meanings),
+        "entry_kind": kind,
         "entry_n": variable(one, raw.n, *DESCRIBED["n"]),
         "entry_w": variable(one, raw.w, *DESCRIBED["w"]),
-        **point(one, raw.theta, velocity, speed, "entry_{}"),
+        **result.point(one, raw.theta, velocity, units.of_velocity, "entry_{}"),
         "entry_exponent": variable(one, growth, rate, "largest Lyapunov exponent"),
         "entry_exponent_stderr": variable(one, error, rate, "standard error of the exponent"),
         "entry_share": variable(one, raw.share, "1", "share of the starts"),
     }
 
 
-def shares(
-    raw: _core.ParameterMap, dims: tuple[Hashable, ...], shape: tuple[int, ...]
-) -> dict[str, Any]:
-    """Return the shares of undecided and failed starts, and how long chaos was followed."""
-    lost, failed, watched = (
-        values.reshape(shape) for values in (raw.undecided, raw.failed, raw.chaos_periods)
-    )
-    return {
-        "undecided": variable(dims, lost, "1", "share of the starts that no attractor captured"),
-        "failed": variable(dims, failed, "1", "share of the starts that failed or diverged"),
-        "chaos_periods": variable(dims, watched, "periods", *CHAOS_PERIODS),
-    }
+@dataclasses.dataclass(frozen=True)
+class _Blocks:
+    """The job of a search."""
+
+    pendulum: Pendulum
+    axes: tuple[list[tuple[str, list[float]]], ...]
+    initial: tuple[Floats, Floats, int]
+    limits: tuple[float, int | None]
+    """Tolerance and bound as passed to the core."""
+    threads: int = 1  # Threads of a block
+    at_once: int = 1  # Number of blocks that this process computes at once
+
+    def survey(self, state: bytes | None) -> _core.Survey:
+        """Return the survey whose steps ``state`` has, or measure them."""
+        many = *self.initial, *self.limits, self.threads, state
+        with core_errors():
+            return _core.Survey(self.pendulum, self.axes, *many)
+
+    def inputs(self, store: Store, step: str, tile: int) -> dict[int, bytes]:
+        """Return what the step before has found in a block and in those around it."""
+        number, state = int(step.removeprefix(_STEP)), store.get("survey") or b""
+        around = _restored(pickle.dumps(self), state).around(tile) if number else []
+        return {block: _last(store, number - 1, block) for block in around}
+
+    def tile(
+        self,
+        step: str,
+        state: bytes,
+        tile: int,
+        inputs: dict[int, bytes],
+        progress: Any = None,  # noqa: ANN401
+    ) -> bytes:
+        """Search a block, or exchange with the blocks around it."""
+        survey, number = _restored(pickle.dumps(self), state), int(step.removeprefix(_STEP))
+        with core_errors():
+            if number == 0:
+                return _GAINED[True] + survey.search(tile, progress=progress)
+            exchanged = survey.exchange(number, tile, inputs, progress=progress)
+            gained = survey.gained(number, tile, exchanged or inputs[tile])
+        return _GAINED[gained] + (exchanged or b"")
+
+    def run(self, work: Work, run: RunOptions) -> tuple[_core.Survey, list[bytes]]:
+        """Compute the blocks that are missing; return the survey and the last result of each."""
+        whole = dataclasses.replace(self, threads=run.workers)
+        state = work.once("survey", lambda: whole.survey(None).state)
+        survey = whole.survey(state)
+        threads, at_once = run.tiles(survey.blocks)
+        work.job = dataclasses.replace(self, threads=threads, at_once=at_once)
+        every, last = range(survey.blocks), 0
+        for last in range(survey.passes + 1):
+            records = work.each(f"{_STEP}{last}", "survey", every)
+            gained = [record[:1] == _GAINED[True] for _, record in records]
+            if not any(gained):
+                break
+        return survey, [_last(work.store, last, block) for block in every]
 
 
-def missed(attributes: Mapping[str, Any], cells: int, cell: str) -> str:
-    """Return a summary line on the attractors that the starts may have missed."""
-    starts = attributes["starts"]
-    one, every = (percent(100 * result.missed(count)) for count in (starts, starts * cells))
-    return (
-        f"{counted(starts, 'start')} a {cell} may miss attractors with {one} of the box, those of "
-        f"all, which exchange what they find, with {every} (95 %)."
-    )
+def _last(store: Store, number: int, block: int) -> bytes:
+    """Return the result of a block after a step."""
+    for step in range(number, -1, -1):
+        record = store.get(f"{_STEP}{step}/{block}") or b""
+        if len(record) > 1:
+            return record[1:]
+    raise RuntimeError(f"block {block} is not in the store")
 
 
-def chaos(attributes: Mapping[str, Any]) -> list[str]:
-    """Return a summary line on how long chaos was followed, if there is any."""
-    periods = attributes["least_chaos_periods"]
-    if not periods:
-        return []
-    line = (
-        f"Chaos: not captured within {counted(periods, 'period')} (the smallest of all cells; "
-        "chaos_periods contains each); a longer transient looks the same."
-    )
-    return [line]
-
-
-def undecided(attributes: Mapping[str, Any]) -> list[str]:
-    """Return summary lines on the shares of undecided and failed starts."""
-    return [
-        f"{100 * attributes[f'{key}_share']:.3g} % of the starts {word}."
-        for key, word in (("undecided", "undecided"), ("failed", "failed or diverged"))
-        if attributes[f"{key}_share"] > 0
-    ]
-
-
-SEARCH = (
-    Field("starts", "1", "initial conditions of each pendulum"),
-    Found("missed", "1", "share of the box that all starts of a cell miss at a chance of 5 %"),
-    Found(
-        "undecided",
-        "1",
-        "share of the starts that no attractor captured",
-        variable="undecided_share",
-    ),
-    Found("failed", "1", "share of the starts that failed or diverged", variable="failed_share"),
-    Found(
-        "chaos_periods",
-        "periods",
-        "least time for which chaos was not captured; 0: no chaos",
-        variable="least_chaos_periods",
-    ),
-    *DRIVE,
-    *result.TIMED,
-    result.REACHED,
-    Field("undecided_at", "", "groups of cells with undecided starts", read=undecided_cells),
-    *result.END,
-    result.SECTION,
-    *result.BOX,
-    result.TOL.hidden,
-    Found("searched_again", "1", "cells searched again for attractors of a neighbour", json=False),
-    result.SEED.hidden,
-    *result.VERSIONS,
-)
-"""Fields of a search for attractors in many pendulums."""
+@functools.lru_cache(maxsize=2)
+def _restored(job: bytes, state: bytes) -> _core.Survey:
+    """Return the survey of a job, made once in each process."""
+    blocks: _Blocks = pickle.loads(job)  # noqa: S301 (of this process)
+    return blocks.survey(state)

@@ -133,21 +133,24 @@ class Grid:
         check_type("grid", given, cls, example)
         return given  # type: ignore[return-value]
 
+    def coordinates(self, units: Units) -> dict[str, Any]:
+        """Return coordinates of a dataset with a value for each cell."""
+        angle, speed, named = self.theta, self.velocity, f"initial velocity {units.derivative}"
+        return {
+            **coordinate("theta", angle.centres, angle.edges, "rad", "initial angle"),
+            **coordinate("velocity", speed.centres, speed.edges, units.of_velocity, named),
+        }
+
     def bare(self, units: Units) -> tuple[tuple[float, float, int], tuple[float, float, int]]:
         """Return both axes as tuples, velocities without dimensions."""
-        low, high, count = self.velocity.as_tuple
-        speeds = units.bare(low, VELOCITY), units.bare(high, VELOCITY), count
-        return self.theta.as_tuple, speeds
+        low, high = (units.bare(end, VELOCITY) for end in (self.velocity.low, self.velocity.high))
+        return self.theta.as_tuple, (low, high, self.velocity.count)
 
     @property
     def attributes(self) -> dict[str, float]:
         """Bounds of the box as attributes of a dataset."""
-        return {
-            "low_theta": self.theta.low,
-            "high_theta": self.theta.high,
-            "low_velocity": self.velocity.low,
-            "high_velocity": self.velocity.high,
-        }
+        axes, ends = ("theta", "velocity"), ("low", "high")
+        return {f"{end}_{axis}": getattr(getattr(self, axis), end) for axis in axes for end in ends}
 
     @property
     def cells(self) -> int:
@@ -156,11 +159,7 @@ class Grid:
 
 
 def coordinate(
-    name: str,
-    centres: Floats,
-    edges: Floats,
-    units: str,
-    long_name: str,
+    name: str, centres: Floats, edges: Floats, units: str, long_name: str
 ) -> dict[str, Any]:
     """Return a coordinate of cells and, by the CF conventions, the bounds of each cell."""
     bounds = f"{name}_bounds"
@@ -173,12 +172,8 @@ def coordinate(
 
 def frequencies(values: ArrayLike) -> Floats:
     """Return frequencies ``Omega/w0`` of the drive, above 0 and ascending, as an array."""
-    try:
-        array = np.atleast_1d(np.asarray(values, dtype=np.float64))
-    except (TypeError, ValueError, OverflowError):
-        array = np.array([np.nan])
-    good = array.ndim == 1 and 0 < array.size <= MOST_CELLS
-    if not (good and np.isfinite(array).all() and (array > 0).all() and (np.diff(array) > 0).all()):
+    array = _numbers(values)
+    if array is None or array.size > MOST_CELLS or array[0] <= 0 or not (np.diff(array) > 0).all():
         raise InputError(
             f"omega must be numbers above 0 in ascending order, got {short_repr(values)}"
         )
@@ -193,11 +188,8 @@ def evenly(values: Floats) -> bool:
 
 def ascending(name: str, given: ArrayLike, *, any_order: bool = False) -> Floats:
     """Return values as an array; each must be greater than the one before, unless in any order."""
-    try:
-        values = np.atleast_1d(np.array(given, dtype=np.float64))
-    except (TypeError, ValueError, OverflowError):
-        values = np.zeros(0)
-    if values.ndim != 1 or not (values.size and np.isfinite(values).all()):
+    values = _numbers(given)
+    if values is None:
         raise InputError(
             f"{name} must be an array (N,) of finite numbers, one or more, got {short_repr(given)}"
         )
@@ -210,16 +202,11 @@ def starts(theta: ArrayLike, velocity: ArrayLike) -> tuple[Floats, Floats]:
     """Return angles and velocities of a list of starts as two arrays of one length."""
     arrays = []
     for name, given in (("theta", theta), ("velocity", velocity)):
-        try:
-            array: Floats = np.ascontiguousarray(given, dtype=np.float64)
-        except (TypeError, ValueError, OverflowError):
+        array = _numbers(given, least=0)
+        if array is None or np.ndim(given) != 1:
             raise InputError(
-                f"{name} must be an array (N,) of numbers, got {short_repr(given)}"
-            ) from None
-        if np.ndim(given) != 1:
-            raise InputError(f"{name} must have the shape (N,), got {np.shape(given)}")
-        if not np.isfinite(array).all():
-            raise InputError(f"{name} must hold finite starts only, got a value that is not finite")
+                f"{name} must be an array (N,) of finite numbers, got {short_repr(given)}"
+            )
         arrays.append(array)
     angles, speeds = arrays
     if angles.size != speeds.size:
@@ -227,3 +214,13 @@ def starts(theta: ArrayLike, velocity: ArrayLike) -> tuple[Floats, Floats]:
             f"theta has {angles.size} values and velocity has {speeds.size}: they must be as many"
         )
     return angles, speeds
+
+
+def _numbers(given: ArrayLike, least: int = 1) -> Floats | None:
+    """Return finite numbers as a new array of one dimension; None if they are not."""
+    try:
+        values: Floats = np.atleast_1d(np.array(given, dtype=np.float64))
+    except (TypeError, ValueError, OverflowError):
+        return None
+    fine = values.ndim == 1 and values.size >= least and np.isfinite(values).all()
+    return values if fine else None

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, Unpack
 import numpy as np
 
 from pendmap.analysis import result, survival
-from pendmap.analysis.basin_tiles import TILE, BasinTiles, Starts, tile_of
+from pendmap.analysis.basin_tiles import BasinTiles, Starts
 from pendmap.analysis.basins import choices_of, ends_of_list
 from pendmap.analysis.draws import LEVELS, drawn, drawn_field
 from pendmap.analysis.grid import FASTEST
@@ -175,9 +175,8 @@ def lifetime(  # noqa: PLR0913 (numerical choices by name)
     speeds = source.uniform(-reach, reach, starts)
     states = Starts(None, angles, units.bare(speeds, VELOCITY))
     choices = choices_of(numerics, None, check=False)
-    cells = tile_of(angles.size, TILE) if run.tiled else None
     rate, threads = units.given(1.0, RATE), run.tiles(1)[0]
-    job = BasinTiles(bare, states, choices, rate, cells, threads=threads)
+    job = BasinTiles(bare, states, choices, rate, threads)
 
     def compute(work: Work) -> xr.Dataset:
         basin_map = ends_of_list(job, work, speeds, pendulum, numerics, check=False)

@@ -45,12 +45,8 @@ class Numerics:
     @property
     def core(self) -> Choices:
         """The choices as passed to the core."""
-        return {
-            "tol": self.tol,
-            "max_periods": self.max_periods,
-            "threads": self.run.workers,
-            "seed": self.run.seed,
-        }
+        bound, seed = self.max_periods, self.run.seed
+        return {"tol": self.tol, "max_periods": bound, "threads": self.run.workers, "seed": seed}
 
     def provenance(self) -> dict[str, Any]:
         """Return attributes on how a result was computed, with the time since ``began``."""

@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
+import itertools
+from collections import Counter
 from functools import partial
 from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 import xarray as xr
 
-from pendmap.analysis import along, cell_search, result, varied
+from pendmap.analysis import cell_search, result, varied
 from pendmap.analysis.draws import drawn, drawn_field, outcome_lines, outcomes
 from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.orbit_table import attractors_of
-from pendmap.analysis.result import Field, Schema, rows, summarised
+from pendmap.analysis.result import Field, Schema, rows
 from pendmap.analysis.run import RunOptions
-from pendmap.analysis.summary import box_said
-from pendmap.analysis.survey_tiles import SurveyTiles
 from pendmap.analysis.tongues import tongues
-from pendmap.errors import InputError, check_flag, core_errors
+from pendmap.errors import InputError, check_flag
 from pendmap.files import facts
 from pendmap.files.variables import flag, variable
-from pendmap.formatting import counted
-from pendmap.model import without_dimensions
+from pendmap.formatting import counted, span
 from pendmap.units import RATE
 
 if TYPE_CHECKING:
@@ -30,17 +29,16 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from pendmap import _core
-    from pendmap.analysis.along import Varied
     from pendmap.analysis.draws import Analysis, Draws
     from pendmap.analysis.grid import Grid
     from pendmap.analysis.run import Keywords
-    from pendmap.engine import Work
+    from pendmap.analysis.varied import Varied
     from pendmap.model import Pendulum, Rig
+    from pendmap.signal import Floats
     from pendmap.units import Units
 
 
 _LISTED = 10  # Largest number of regimes in a summary
-_PLACES = 3  # Largest number of groups of cells with undecided starts in a summary
 _FREQUENCIES = 201  # Number of frequencies of the critical curves over a map, besides turns
 
 
@@ -102,20 +100,17 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     """Find the set of attractors in every cell of a plane of two parameters.
 
     Every cell is searched from a few initial conditions, different from its neighbours', and from
-    points of its neighbours' attractors: within blocks of 16 by 16 cells, grids are refined from
-    every eighth cell to all, each cell starting also from the attractors of its neighbours on the
-    coarser grid; then, pass by pass over the whole plane, from the attractors that cells at
-    distances of eight, four, two and one have and it lacks, until none gains any. In this way
-    coexisting branches are followed, and the result does not depend on the order of the work.
+    points of its neighbours' attractors: within blocks of 16 by 16 cells from coarse grids to fine
+    ones, then, pass by pass over the whole plane, from the attractors that cells at distances of
+    eight, four, two and one have and it lacks, until none gains any. So coexisting branches are
+    followed, and the result does not depend on the order of the work.
 
     Trajectories run until a stable orbit, found by Newton's method, has captured them. Those not
-    captured are followed four times as long again, in four windows. Windows of equal senses of
-    rotation whose regions meet form a group; a set of groups that no trajectory leaves, with an
-    exponent that is positive by four standard errors, is chaos of its kind, unless it contains a
-    stable orbit of period 1 to 4 (Newton's method from the least gaps of 64 by 64 starts) that
-    captures it. A run continues while its last group has no known successor, and a set of fewer
-    than 16 runs gets 16 more from its points. If the cell has another attractor, which could end
-    chaos, none of 32 runs may end within 2500 periods. All other starts are undecided.
+    captured are followed four times as long again, in four windows. A set of windows of one sense
+    of rotation that no trajectory leaves, with an exponent that is positive by four standard
+    errors, is chaos of its kind, unless a stable orbit of period 1 to 4 in it captures it. If the
+    cell has another attractor, which could end chaos, none of 32 runs may end within 2500 periods.
+    All other starts are undecided.
 
     Parameters
     ----------
@@ -151,15 +146,14 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     Returns
     -------
     xarray.Dataset
-        Over (row, column): ``regime`` (index into ``regime_has``, over ``kind``
-        too, and ``regime_share``),
-        ``attractors`` (how many coexist, mirror images counted), ``period`` and ``winding`` of the
-        kind that most starts end on (0 for chaos), ``exponent`` (the largest of all attractors),
-        ``undecided`` and ``failed`` (shares of the starts), ``chaos_periods`` (periods within which
-        nothing captured the chaos of a cell, 0 without), ``share`` over ``kind`` too. All
-        attractors over ``entry``: ``entry_cell``, ``entry_kind``, ``entry_n``, ``entry_w``,
-        ``entry_theta``, ``entry_velocity``, ``entry_exponent``, ``entry_exponent_stderr``,
-        ``entry_share``. An attractor that only a neighbour led to has the share 0.
+        Over (row, column): ``regime`` (index into ``regime_share``, and ``regime_has`` over
+        ``kind`` too), ``attractors`` (how many coexist, mirror images counted), ``period`` and
+        ``winding`` of the kind that most starts end on (0 for chaos), ``exponent`` (the largest of
+        all attractors), ``undecided`` and ``failed`` (shares of the starts), ``chaos_periods``
+        (periods within which nothing captured the chaos of a cell, 0 without), ``share`` over
+        ``kind`` too. All attractors over ``entry``: ``entry_cell``, ``entry_kind``, ``entry_n``,
+        ``entry_w``, ``entry_theta``, ``entry_velocity``, ``entry_exponent``,
+        ``entry_exponent_stderr``, ``entry_share``. One that only a neighbour led to has share 0.
 
     Raises
     ------
@@ -180,111 +174,90 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     ['bound', 'entry', 'kind', 'omega', 'p', 'set']
     """
     pendulum = varied.having(pendulum, ranges)
-    bare, units = without_dimensions(pendulum)
-    columns, rows = varied.varied(pendulum, ranges, 2)
+    columns, rows = axes = varied.varied(pendulum, ranges, 2)
     run = RunOptions.of(run, options)
-    numerics = Numerics(run, tol, max_periods)
-    search = cell_search.CellSearch(starts, box, numerics)
-    curves = check_flag("curves", curves)
-    if draws is not None:
-        several = drawn(pendulum, draws, run)
-        same = partial(
-            parameter_map,
-            ranges=ranges,
-            starts=starts,
-            box=search.within(units),
-            tol=tol,
-            max_periods=max_periods,
-        )
-        return regimes_over(same(pendulum, curves=curves, run=several.first), several, same)
+    units, curves = pendulum.units, check_flag("curves", curves)
+    several = None if draws is None else drawn(pendulum, draws, run)
     over: dict[str, Any] = {}
-    if curves:
-        over = _curves(pendulum, columns, rows, run.part(0, 2))
-        run = run.part(1, 2)
-    axes, initial = (columns.kernel, rows.kernel), search.initial(units)
-    job = SurveyTiles(bare, axes, initial, (numerics.tol, numerics.max_periods))
+    if curves and several is None:
+        over, run = _curves(pendulum, columns, rows, run.part(0, 2)), run.part(1, 2)
+    search = cell_search.CellSearch(pendulum, axes, starts, box, Numerics(run, tol, max_periods))
+    if several is not None:
+        same = partial(parameter_map, ranges=ranges, starts=starts, box=search.box)
+        same = partial(same, tol=tol, max_periods=max_periods)
+        return regimes_over(same(pendulum, curves=curves, run=several.first), several, same)
 
-    def compute(work: Work) -> xr.Dataset:
-        with core_errors():
-            survey, blocks = job.run(work, run)
-            raw = survey.result(blocks)
-        dataset = _dataset(raw, (columns, rows), units).assign(over)
-        values = {
-            **search.attributes(raw, units),
-            **along.kept(pendulum, (columns, rows)),
-            "columns": columns.name,
-            "rows": rows.name,
-            "cells": columns.values.size * rows.values.size,
-        }
-        replaced = [*columns.replaced, *rows.replaced]
-        SCHEMA.complete(dataset, pendulum, values, raw, replaced)
-        dataset.attrs["title"] = varied.title(pendulum, columns, rows)
-        lines = [*_summary(dataset), *varied.remarks(pendulum, columns, rows)]
-        summarised(dataset, lines, pendulum, "attractors are")
-        return dataset
+    def make(survey: _core.Survey, blocks: list[bytes]) -> cell_search.Made:
+        raw = survey.result(blocks)
+        cells = columns.values.size * rows.values.size
+        names = {"columns": columns.name, "rows": rows.name, "cells": cells}
+        return raw, _dataset(raw, columns, rows, units).assign(over), names
 
-    request = {
-        "ranges": varied.requested([columns, rows], ranges),
-        **search.request,
-        "curves": curves,
-    }
-    return run.complete("parameter_map", pendulum, request, job, compute)
+    return search.result(SCHEMA, make, _summary, {"curves": curves})
 
 
-def _dataset(raw: _core.ParameterMap, axes: tuple[Varied, Varied], units: Units) -> xr.Dataset:
-    columns, rows = axes
-    shape = (rows.values.size, columns.values.size)
-    dims = (rows.name, columns.name)
-    cells = shape[0] * shape[1]
-    cell, n, w = raw.cell, raw.n, raw.w
-    kinds, which = cell_search.names(raw), raw.kind
-    regimes, regime, frequency = cell_search.regimes(raw, cells)
-    sets = [[kinds[k] for k in one] or [cell_search.UNDECIDED] for one in regimes]
+def regimes(
+    raw: _core.ParameterMap, cells: int
+) -> tuple[list[tuple[int, ...]], NDArray[np.int16], Floats]:
+    """Return the sets of kinds, the most frequent first; the set of each cell; their shares."""
+    bounds = np.searchsorted(raw.cell, np.arange(cells + 1))
+    of_cell = [
+        tuple(np.unique(raw.kind[low:high]).tolist()) for low, high in itertools.pairwise(bounds)
+    ]
+    count = Counter(of_cell)
+    # Those without any attractor are the last of equally frequent ones.
+    sets = sorted(count, key=lambda one: (-count[one], one or (len(raw.kinds),)))
+    place = {one: k for k, one in enumerate(sets)}
+    share = np.array([count[one] / cells for one in sets])
+    return sets, np.array([place[one] for one in of_cell], dtype=np.int16), share
+
+
+def _dataset(raw: _core.ParameterMap, columns: Varied, rows: Varied, units: Units) -> xr.Dataset:
+    dims, shape = (rows.name, columns.name), (rows.values.size, columns.values.size)
+    cells, cell, which = shape[0] * shape[1], raw.cell, raw.kind
+    kinds = [one.name for one in raw.kinds]
+    every, regime, frequency = regimes(raw, cells)
+    sets = [[kinds[k] for k in one] or [cell_search.UNDECIDED] for one in every]
     share = np.zeros((len(kinds), cells))
     np.add.at(share, (which, cell), raw.share)
     exponent = np.full(cells, np.nan)
     np.fmax.at(exponent, cell, raw.exponent)
-    period, winding = (np.zeros(cells, dtype=np.int32) for _ in range(2))
     # The kind on which most starts end, the first of equal ones.
-    leading = share[which, cell]
-    for k in np.lexsort((-np.arange(cell.size), leading)):
-        period[cell[k]], winding[cell[k]] = n[k], abs(w[k]) if n[k] else 0
+    period, winding = (np.zeros(cells, dtype=np.int32) for _ in range(2))
+    order = np.lexsort((-np.arange(cell.size), share[which, cell]))
+    period[cell[order]] = raw.n[order]
+    winding[cell[order]] = np.where(raw.n > 0, np.abs(raw.w), 0)[order]
     coexist = np.bincount(cell, minlength=cells).astype(np.int16)
-    on_kind = "share of the starts on a kind of attractor"
+    on_kind, largest = "share of the starts on a kind", units.given(exponent, RATE)
+    names = dict(enumerate(map("+".join, sets)))
 
     def over(values: NDArray[Any], *texts: str, **flags: Any) -> tuple[Any, ...]:  # noqa: ANN401
         return variable(dims, values.reshape(shape), *texts, **flags)
 
-    data: dict[str, Any] = {
-        "regime": over(regime, "", "set of attractors", flags=dict(enumerate(map("+".join, sets)))),
-        "regime_share": variable("set", frequency, "1", "share of the cells"),
-        "regime_has": having("set", sets, kinds),
-        "attractors": over(coexist, "1", "attractors that coexist"),
-        "period": over(period, "periods", "period of the kind that most starts end on"),
-        "winding": over(winding, "turns", "net turns in that period"),
-        "exponent": over(units.given(exponent, RATE), units.of_rate, "largest Lyapunov exponent"),
-        "share": variable(("kind", *dims), share.reshape((len(kinds), *shape)), "1", on_kind),
-        **cell_search.shares(raw, dims, shape),
-        **cell_search.entries(raw, units),
-    }
-    coordinates = {
-        **columns.coordinates,
-        **rows.coordinates,
-        "kind": variable("kind", np.array(kinds, dtype=str), long_name="kind of attractor"),
-        "set": variable("set", np.arange(len(sets)), "1", "number of the regime"),
-    }
-    return xr.Dataset(data, coords=coordinates)
+    return xr.Dataset(
+        {
+            "regime": over(regime, "", "set of attractors", flags=names),
+            "set": variable("set", np.arange(len(sets)), "1", "number of the regime"),
+            "regime_share": variable("set", frequency, "1", "share of the cells"),
+            "regime_has": having("set", sets, kinds),
+            "attractors": over(coexist, "1", "attractors that coexist"),
+            "period": over(period, "periods", "period of the kind that most starts end on"),
+            "winding": over(winding, "turns", "net turns in that period"),
+            "exponent": over(largest, units.of_rate, "largest Lyapunov exponent"),
+            "share": variable(("kind", *dims), share.reshape((-1, *shape)), "1", on_kind),
+            **cell_search.variables(raw, dims, shape, units),
+        },
+        coords={**columns.coordinates, **rows.coordinates},
+    )
 
 
 def _curves(
     model: Pendulum | Rig, columns: Varied, rows: Varied, run: RunOptions
 ) -> dict[str, Any]:
     """Return the critical curves between the ends of the axes."""
-    axes = (columns, rows)
-    by_name = {axis.name.lower(): axis for axis in axes}
+    by_name = {axis.name.lower(): axis for axis in (columns, rows)}
     if set(by_name) != {"p", "omega"}:
-        given = " and ".join(axis.name for axis in axes)
-        raise InputError(f"curves must be over p and omega, got {given}")
+        raise InputError(f"curves must be over p and omega, got {columns.name} and {rows.name}")
     omega, p = by_name["omega"], by_name["p"]
     if omega.values.size == 1 or p.bare[-1] <= 0:
         raise InputError("curves must have ranges of omega and of p above 0")
@@ -294,57 +267,30 @@ def _curves(
     p_max = float(p.bare[-1] + (np.diff(p.bare)[0] / 2 if p.bare.size > 1 else 0.0))
     frequency = np.linspace(max(low, omega.bare[0] / 2), high, _FREQUENCIES)
     curves = tongues(model, frequency, p_max, inverted=False, refine=True, run=run)
-    scale, sought = omega.values[-1] / omega.bare[-1], curves["asked"]
+    scaled = omega.values[-1] / omega.bare[-1] * curves["omega"].values
+    along, at = "curve_frequency", "curve_point"
     return {
-        "curve_omega": ("curve_frequency", scale * curves["omega"].values, omega.attributes),
-        "curve_fold": ("curve_frequency", curves["fold"].values, p.attributes),
-        "curve_fold_sought": ("curve_frequency", sought.values, sought.attrs),
-        "curve_index": ("curve_point", curves["index"].values, curves["index"].attrs),
-        "curve_p": ("curve_point", curves["p"].values, p.attributes),
-        "curve_multiplier": (
-            "curve_point",
-            curves["multiplier"].values,
-            curves["multiplier"].attrs,
-        ),
+        "curve_omega": (along, scaled, omega.attributes),
+        "curve_fold": (along, curves["fold"].values, p.attributes),
+        "curve_fold_sought": (along, curves["asked"].values, curves["asked"].attrs),
+        "curve_index": (at, curves["index"].values, curves["index"].attrs),
+        "curve_p": (at, curves["p"].values, p.attributes),
+        "curve_multiplier": (at, curves["multiplier"].values, curves["multiplier"].attrs),
     }
 
 
-def _place_text(place: dict[str, Any]) -> str:
-    """Return the ranges of a group of cells, and its size, as text."""
-    spans = [
-        f"{name} = {low:.4g}" + (f" to {high:.4g}" if high > low else "")
-        for name, (low, high) in place["ranges"].items()
-    ]
-    return f"{', '.join(spans)} ({counted(place['cells'], 'cell')})"
-
-
 def _summary(dataset: xr.Dataset) -> list[str]:
-    a = facts(dataset)
-    count, kinds = dataset.sizes["set"], sets(dataset)
-    spans = [
-        f"{name} = {dataset[name].values[0]:g} to {dataset[name].values[-1]:g}"
-        for name in (a["columns"], a["rows"])
+    a, kinds = facts(dataset), sets(dataset)
+    ranges = [span(name, *dataset[name].values[[0, -1]]) for name in (a["columns"], a["rows"])]
+    lines = [
+        f"{', '.join(ranges)}: {counted(a['cells'], 'cell')}, {counted(len(kinds), 'regime')}."
     ]
-    counts = f"{counted(a['cells'], 'cell')}, {counted(count, 'regime')}."
-    lines = [f"{', '.join(spans)}: {counts}"]
-    shares = dataset["regime_share"].values[:_LISTED]
-    lines += [f"{100 * share:.3g} %: {', '.join(kinds[k])}." for k, share in enumerate(shares)]
-    if count > _LISTED:
-        rest = float(dataset["regime_share"][_LISTED:].sum())
-        lines.append(f"{100 * rest:.3g} %: {count - _LISTED} more regimes, in the result.")
-    lines.append(cell_search.missed(a, a["cells"], "cell"))
-    lines += [*cell_search.chaos(a), *cell_search.undecided(a)]
-    places = cell_search.undecided_cells(dataset)
-    if places:
-        listed = "; ".join(_place_text(place) for place in places[:_PLACES])
-        more = f"; {len(places) - _PLACES} smaller groups" if len(places) > _PLACES else ""
-        lines.append(f"Cells with undecided starts: {listed}{more}.")
-    lines.append(
-        f"{counted(a['starts'], 'start')} a cell, {box_said(a)}; "
-        f"{counted(a['searched_again'], 'cell')} searched again for attractors of a neighbour; "
-        f"error after 5 periods {a['reached_error']:.2g}; "
-        f"{a['seconds']:.1f} s on {counted(a['threads'], 'thread')}."
-    )
+    shares = dataset["regime_share"].values
+    for share, one in zip(shares[:_LISTED], kinds, strict=False):
+        lines.append(f"{100 * share:.3g} %: {', '.join(one)}.")
+    if len(kinds) > _LISTED:
+        rest = 100 * shares[_LISTED:].sum()
+        lines.append(f"{rest:.3g} %: {len(kinds) - _LISTED} more regimes, in the result.")
     return lines
 
 

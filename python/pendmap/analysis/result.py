@@ -7,8 +7,8 @@ unit 1 with its meaning in the long name.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
-import operator
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -44,27 +44,31 @@ _WITHOUT_INDEX: Final = ("bound", "eigenvalue", "part")  # Dimensions with two p
 
 @dataclasses.dataclass(frozen=True)
 class Field:
-    """An attribute of a dataset and the key of its JSON object, or one of the two alone."""
+    """A fact of a dataset and the key of its JSON object, or one of the two alone."""
 
     name: str
     unit: str
     meaning: str
     core: str | None = ""
-    """Path of the value in the core's result if the name differs, like ``texture.chance``; None if
-    the core's result does not have it."""
-    json: bool = True
-    """Whether the JSON object has the key."""
-    convert: Callable[[Any], Any] | None = None
-    """Function that converts the attribute to the JSON value."""
+    """Name in the core's result if it differs; None if the core's result does not have it."""
+    json: bool = True  # Whether the JSON object has the key
+    convert: Callable[[Any], Any] | None = None  # Converts the fact to the JSON value
     read: Callable[[xr.Dataset], Any] | None = None
-    """Function that computes the JSON value from the dataset, if no attribute holds it."""
-    when: str = ""
-    """Attribute that must be true for the JSON object to have the key."""
+    """Function that computes the JSON value from the dataset, if no fact holds it."""
+    when: str = ""  # Fact that must be true for the JSON object to have the key
+    variable: str = ""
+    """Variable without dimensions that holds it, if another variable has the name of the field."""
+    computed: bool = False  # Whether a variable holds it, not an attribute
 
     @property
     def hidden(self) -> Field:
         """The field without its key in the JSON object."""
         return dataclasses.replace(self, json=False)
+
+    @property
+    def place(self) -> str:
+        """Name of the attribute or variable that holds the value."""
+        return self.variable or self.name
 
     def value(self, dataset: xr.Dataset, known: Mapping[str, Any]) -> Any:  # noqa: ANN401 (JSON)
         """Return the JSON value from a dataset and its facts; null where the fact is absent."""
@@ -73,35 +77,19 @@ class Field:
         value = known.get(self.place)
         return value if value is None or self.convert is None else self.convert(value)
 
-    @property
-    def place(self) -> str:
-        """Name of the attribute or variable that holds the value."""
-        return self.name
-
-    def put(self, dataset: xr.Dataset, value: Any, units: Units) -> None:  # noqa: ANN401, ARG002
-        """Set the value in a dataset."""
-        dataset.attrs[self.place] = value
-
-
-@dataclasses.dataclass(frozen=True)
-class Found(Field):
-    """A number or text that was computed: a variable without dimensions, not an attribute."""
-
-    variable: str = ""
-    """Name of the variable, if another variable of the dataset has the name of the field."""
-
-    @property
-    def place(self) -> str:
-        """Name of the variable that holds the value."""
-        return self.variable or self.name
-
     def put(self, dataset: xr.Dataset, value: Any, units: Units) -> None:  # noqa: ANN401
         """Set the value in a dataset."""
-        if self.unit == FLAG:
+        if not self.computed:
+            dataset.attrs[self.place] = value
+        elif self.unit == FLAG:
             dataset[self.place] = flag((), value, self.meaning)
         else:
             unit = getattr(units, _OF[self.unit]) if self.unit in _OF else self.unit
             dataset[self.place] = variable((), value, unit, self.meaning)
+
+
+Found: Final = functools.partial(Field, computed=True)
+"""A number or text that was computed: a variable without dimensions, not an attribute."""
 
 
 class Schema:
@@ -120,7 +108,7 @@ class Schema:
         raw: object = None,
         replaced: Collection[str] = (),
     ) -> None:
-        """Set the facts of a dataset: values given, else those of the core's result.
+        """Set the facts of a dataset: values given, else those of the core's result, or of several.
 
         Those of a dataset that it was made of are removed. The parameters of the model become
         coordinates without dimensions, except those ``replaced`` by others, which vary.
@@ -136,27 +124,22 @@ class Schema:
         for field in self.fields:
             value = values.get(field.name)
             if not (field.name in values or field.read or field.core is None or raw is None):
-                value = operator.attrgetter(field.core or field.name)(raw)
+                value = of_core(field.core or field.name, raw)
             if value is not None:
                 field.put(dataset, value, model.units)
-        fixed = {n: x for n, x in known.items() if n in LABELS and n not in replaced}
-        self.describe(dataset, fixed)
-        dataset.attrs["history"] = history_of(dataset)
-
-    def describe(self, dataset: xr.Dataset, parameters: Mapping[str, Any]) -> None:
-        """Set what all results have: parameters, indices of dimensions, attributes of CF."""
         bare = dataset.attrs["units"] != "SI"
-        for name, value in parameters.items():
-            label = LABELS[name]
-            unit = "1" if bare and name == "torque" else label.unit or "1"
-            if name not in dataset.variables and name not in dataset.dims:
-                dataset.coords[name] = variable((), float(value), unit, label.meaning)
+        for name, label in LABELS.items():
+            there = name in dataset.variables or name in dataset.dims
+            if name in known and name not in replaced and not there:
+                unit = "1" if bare and name == "torque" else label.unit or "1"
+                dataset.coords[name] = variable((), float(known[name]), unit, label.meaning)
         dataset.coords.update(indices(dataset))
         dataset.attrs |= {
             "Conventions": CONVENTIONS,
             "comment": ANALYSES[self.kind][2],
             "source": f"pendmap {dataset.attrs.get('pendmap_version', _core.__version__)}",
             "references": self.references,
+            "history": history_of(dataset),
         }
 
     def json(self, dataset: xr.Dataset) -> dict[str, Any]:
@@ -169,6 +152,12 @@ class Schema:
         }
 
 
+def of_core(name: str, raw: object) -> Any:  # noqa: ANN401 (whatever it is)
+    """Return a value of the core's result, or of the first of a tuple that has it."""
+    sources = raw if isinstance(raw, tuple) else (raw,)
+    return getattr(next(one for one in sources if hasattr(one, name)), name)
+
+
 def indices(dataset: xr.Dataset) -> dict[str, Any]:
     """Return numbers from 0 for each dimension without a coordinate, so that results align."""
     return {
@@ -178,10 +167,9 @@ def indices(dataset: xr.Dataset) -> dict[str, Any]:
     }
 
 
-def of_model(model: Pendulum | Rig, what: str) -> list[str]:
-    """Return summary lines on a model that misses its record or has effects on its reading."""
-    ratio = misses(model.notes)
-    lines = []
+def summarised(dataset: xr.Dataset, lines: Iterable[str], model: Pendulum | Rig, what: str) -> None:
+    """Set the summary of a dataset; ``what`` begins the note on effects on the reading."""
+    lines, ratio = [*lines], misses(model.notes)
     if math.isfinite(ratio):
         lines.append(f"This model misses its record by {ratio:.3g} times the noise.")
     names = [effect.name for effect in model.effects if effect.reads]
@@ -190,12 +178,7 @@ def of_model(model: Pendulum | Rig, what: str) -> list[str]:
         lines.append(
             f"{', '.join(names)} {verb} on the sensor's reading alone: {what} of the motion itself."
         )
-    return lines
-
-
-def summarised(dataset: xr.Dataset, lines: Iterable[str], model: Pendulum | Rig, what: str) -> None:
-    """Set the summary of a dataset; ``what`` begins the note on effects on the reading."""
-    dataset.attrs["summary"] = "\n".join([*lines, *of_model(model, what)])
+    dataset.attrs["summary"] = "\n".join(lines)
 
 
 def point(
@@ -210,6 +193,17 @@ def point(
         name.format("theta"): variable(dims, theta, "rad", "angle of a stroboscopic point"),
         name.format("velocity"): variable(dims, velocity, unit, "velocity of this point"),
     }
+
+
+def labels(
+    dims: tuple[str, ...],
+    values: Any,  # noqa: ANN401 (an array)
+    names: Iterable[str],
+) -> tuple[Any, ...]:
+    """Return the attractor of each start as a variable; ``names`` are those of the attractors."""
+    comment = "number of the attractor; 0 undecided within the bound, -1 failed or diverged"
+    flags = dict(enumerate(["failed", "undecided", *names], -1))
+    return variable(dims, values, long_name="attractor", comment=comment, flags=flags)
 
 
 def records(dataset: xr.Dataset, **variables: str) -> list[dict[str, Any]]:
@@ -281,10 +275,6 @@ OWN: Final = (
 TIMED: Final = (SECONDS, SIMD, THREADS)
 RUN: Final = (*TIMED, SEED, VERSION, FORMAT)
 VERSIONS: Final = (VERSION.hidden, FORMAT.hidden)  # Versions, as attributes only
-SUMMARY: Final = Field(
-    "summary", "", "findings, a sentence a line", None, convert=lambda text: text.split("\n")
-)
-MISSES: Final = Field(
-    "misses_record", "1", "residual over noise of a model that misses its record", None
-)
+SUMMARY: Final = Field("summary", "", "findings, a line each", None, convert=str.splitlines)
+MISSES: Final = Field("misses_record", "1", "residual over noise where it is too large", None)
 END: Final = (SUMMARY, MISSES)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from pendmap.analysis.orbit_table import attractors_of
-from pendmap.analysis.sweeps.report import varied_names
+from pendmap.analysis.sweep_table import varied_names
 from pendmap.charts import names, palette, plane
 from pendmap.charts.chart import Axis, Chart, Panel, holding
 from pendmap.charts.legend import typeset

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import rerun.blueprint as rrb
 
-from pendmap.analysis.sweeps.report import varied_names
+from pendmap.analysis.sweep_table import varied_names
 from pendmap.charts import basin_sweep, palette, registry
 from pendmap.charts import marks as charts
 from pendmap.charts.chart import Sheet

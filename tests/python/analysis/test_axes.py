@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import pendmap
-from pendmap import Axis, Effect, Formula, Grid, InputError, Pendulum, Rig
+from pendmap import Axis, Effect, Formula, Grid, InputError, Pendulum, Rig, RunOptions
 from pendmap.analysis.orbit_table import attractors_of
 
 if TYPE_CHECKING:
@@ -29,55 +29,37 @@ def test_an_array_has_the_centres_of_cells() -> None:
     grid = Grid(theta=np.linspace(-1, 1, 5), velocity=[0.5, 1.5, 2.5, 3.5])
     assert grid.theta == Axis(-1.25, 1.25, 5)
     assert grid.velocity.centres == pytest.approx([0.5, 1.5, 2.5, 3.5], abs=1e-15)
-    assert Grid(theta=[-1.0, 0.0, 1.0]).theta == Axis(-1.5, 1.5, 3)  # type: ignore[arg-type]
     result = pendmap.basins(Pendulum(p=0.6), grid)
     assert result.theta.values == pytest.approx(np.linspace(-1, 1, 5), abs=1e-15)
-    for values in (np.geomspace(0.1, 1, 5), [1.0, 2.0, 4.0, 8.0], [1.0], np.array([])):
-        with pytest.raises(InputError, match="velocity must be") as error:
+    for values in (np.geomspace(0.1, 1, 5), [1.0], np.array([])):
+        with pytest.raises(InputError, match=r"^velocity must be [^\n]*$"):
             Grid(velocity=values)  # type: ignore[arg-type]
-        assert "\n" not in str(error.value)
 
 
 def test_a_whole_number_is_the_default_window() -> None:
-    for model in (BARE, SI):
-        w0 = model.units.w0
-        result = pendmap.basins(model, 8, check=False)
-        assert result.label.equals(pendmap.basins(model, Grid.square(8, w0), check=False).label)
-        assert float(result.velocity_bounds.max()) == pytest.approx(3 * w0)
-        assert "(the default window" in result.attrs["summary"]
-        swept = pendmap.sweep(model, {"p": [0.5, 0.6]}, grid=8, check=False)
-        assert float(swept.velocity[-1]) == pytest.approx(3 * w0 * 7 / 8)
+    w0 = SI.units.w0
+    result = pendmap.basins(SI, 8, check=False)
+    assert result.label.equals(pendmap.basins(SI, Grid.square(8, w0), check=False).label)
+    assert float(result.velocity_bounds.max()) == pytest.approx(3 * w0)
+    swept = pendmap.sweep(SI, {"p": [0.5, 0.6]}, grid=8, check=False)
+    assert float(swept.velocity[-1]) == pytest.approx(3 * w0 * 7 / 8)
 
 
-def test_uneven_values_of_parameters_are_mapped_where_they_are(tmp_path: Path) -> None:
-    values = [0.2, 0.5, 0.9, 1.6]
-    one = {"p": np.array(values), "omega": (1.8, 2.2, 2)}
-    found = pendmap.parameter_map(Pendulum(), one, starts=4)
-    assert found.p.values.tolist() == values
-    even = pendmap.parameter_map(Pendulum(), {"p": np.linspace(0.2, 1.6, 3), "omega": [2.0]})
-    same = pendmap.parameter_map(Pendulum(), {"p": (0.2, 1.6, 3), "omega": (2.0, 2.0, 1)})
-    assert even.drop_attrs().equals(same.drop_attrs())
-    diagram = pendmap.bifurcation(Pendulum(), {"p": np.geomspace(0.1, 0.8, 4)}, starts=4)
-    assert diagram.p.values == pytest.approx(np.geomspace(0.1, 0.8, 4))
-    place = tmp_path / "map.zarr"
-    stored = pendmap.parameter_map(Pendulum(), one, starts=4, run=pendmap.RunOptions(store=place))
-    assert stored.regime.equals(found.regime)
+@pytest.mark.parametrize(
+    ("name", "more"), [("bifurcation", {}), ("parameter_map", {"omega": (1.9, 2.1, 2)})]
+)
+def test_values_may_be_uneven_and_may_fall(name: str, more: dict[str, Any], tmp_path: Path) -> None:
+    found = functools.partial(getattr(pendmap, name), Pendulum(), starts=4)
+    rising = found({"p": (0.3, 0.9, 3), **more})
+    assert found({"p": (0.9, 0.3, 3), **more}).drop_attrs().equals(rising.drop_attrs())
+    assert found({"p": np.linspace(0.3, 0.9, 3), **more}).drop_attrs().equals(rising.drop_attrs())
+    values, run = [0.3, 0.5, 0.9], RunOptions(store=tmp_path / "a.zarr")
+    listed = found({"p": np.array(values[::-1]), **more}, run=run)
+    assert listed.p.values.tolist() == values
+    again = found({"p": values, **more}, run=dataclasses.replace(run, resume=True))
+    assert again.drop_attrs().equals(listed.drop_attrs())
     with pytest.raises(InputError, match="p must be ascending or descending values"):
-        pendmap.bifurcation(Pendulum(), {"p": [0.4, 0.2, 0.3]})
-
-
-def test_falling_values_give_the_result_of_rising_ones(tmp_path: Path) -> None:
-    values = [0.3, 0.5, 0.9]
-    for name, more in (("bifurcation", {}), ("parameter_map", {"omega": (1.9, 2.1, 2)})):
-        found = functools.partial(getattr(pendmap, name), Pendulum(), starts=4)
-        rising = found({"p": (0.3, 0.9, 4), **more})
-        assert found({"p": (0.9, 0.3, 4), **more}).drop_attrs().equals(rising.drop_attrs())
-        run = pendmap.RunOptions(store=tmp_path / f"{name}.zarr")
-        listed = found({"p": np.array(values[::-1]), **more}, run=run)
-        assert listed.p.values.tolist() == values
-        run = dataclasses.replace(run, resume=True)
-        again = found({"p": values, **more}, run=run)
-        assert again.drop_attrs().equals(listed.drop_attrs())
+        found({"p": [0.4, 0.2, 0.3], **more})
 
 
 def test_a_selected_value_is_in_the_model() -> None:
@@ -100,7 +82,7 @@ UNEVEN = (1.9, 2.0, 2.3)  # Hz
 
 def same_as_alone(swept: xr.Dataset, at: dict[str, int], model: Pendulum | Rig) -> None:
     """Compare one map of a sweep with the basins of its model alone, by shares and attractors."""
-    here, alone = swept.isel(at), pendmap.basins(model, 20, check=False)
+    here, alone = swept.isel(at), pendmap.basins(model, 16, check=False)
     shares = here.fraction.values[here.exists.values > 0]
     assert np.sort(shares) == pytest.approx(np.sort(alone.fraction.values), abs=0.004)
     assert pendmap.pendulum_of(here) == model
@@ -111,23 +93,17 @@ def same_as_alone(swept: xr.Dataset, at: dict[str, int], model: Pendulum | Rig) 
 )
 def test_a_given_stroke_stays_where_the_frequency_varies(name: str, factor: float) -> None:
     rig = Rig.of(**STROKE, frequency_hz=1.5)
-    found = pendmap.sweep(rig, {name: factor * np.array(UNEVEN)}, grid=20, check=False)
+    found = pendmap.sweep(rig, {name: factor * np.array(UNEVEN)}, grid=16, check=False)
     for k, hertz in enumerate(UNEVEN):
         one = Rig.of(**STROKE, frequency_hz=hertz)
         assert found.p.values[k] == pytest.approx(one.p, rel=1e-14)
         if name == "frequency_hz":
             same_as_alone(found, {name: k}, one)
     assert float(found.fraction.isel({name: 2}).max()) < 0.9  # rotations exist
-    assert (
-        "The stroke Y = 30 mm is constant: p = 0.4358 to 0.6387 by p = Y Omega^2/g"
-        in found.attrs["summary"]
-    )
+    says = "The stroke Y = 30 mm is constant: p = 0.4358 to 0.6387 by p = Y Omega^2/g"
+    assert says in found.attrs["summary"]
     wide = {name: factor * np.array(UNEVEN), "c_over_m": [0.5, 0.6]}
-    for result in (
-        found,
-        pendmap.bifurcation(rig, {name: [1.0]}),
-        pendmap.parameter_map(rig, wide),
-    ):
+    for result in (found, pendmap.parameter_map(rig, wide, starts=3)):
         known = pendmap.files.facts(result)
         assert (known["kept"], known["stroke_mm"]) == ("stroke_mm", 30.0)
         assert result.p.dims == (name,)
@@ -135,10 +111,8 @@ def test_a_given_stroke_stays_where_the_frequency_varies(name: str, factor: floa
 
 def test_a_given_p_stays_where_the_frequency_varies() -> None:
     fixed = dataclasses.replace(Rig.of(**STROKE, frequency_hz=1.9), p=0.4)
-    assert fixed.given_stroke is None
-    found = pendmap.sweep(fixed, {"frequency_hz": [1.9, 2.3]}, grid=20, check=False)
-    assert found.p.values == 0.4
-    assert found.attrs["kept"] == "p"
+    found = pendmap.sweep(fixed, {"frequency_hz": [1.9, 2.3]}, grid=16, check=False)
+    assert (found.p.values, found.attrs["kept"]) == (0.4, "p")
     assert "p = 0.4 is constant, as the model gives it: not the stroke" in found.attrs["summary"]
     same_as_alone(found, {"frequency_hz": 1}, dataclasses.replace(fixed, Omega=2.3 * math.tau))
     for ranges in ({"p": [0.2, 0.4]}, {"stroke_mm": [10.0, 20.0]}):
@@ -146,54 +120,49 @@ def test_a_given_p_stays_where_the_frequency_varies() -> None:
 
 
 def test_stroke_and_frequency_vary_together() -> None:
-    ranges = {"stroke_mm": [20.0, 30.0], "frequency_hz": [*UNEVEN]}
-    found = pendmap.sweep(Rig(w0=6.2, c_over_m=0.62, Tr=0.1), ranges, grid=20, check=False)
-    for j, stroke in enumerate(ranges["stroke_mm"]):
-        for k, hertz in enumerate(UNEVEN):
-            one = Rig.of(**{**STROKE, "stroke_mm": stroke}, frequency_hz=hertz)
-            same_as_alone(found, {"stroke_mm": j, "frequency_hz": k}, one)
-
-
-def test_a_curve_of_stroke_and_frequency_has_its_p() -> None:
+    rig, ranges = Rig(w0=6.2, c_over_m=0.62, Tr=0.1), {"stroke_mm": [20.0, 30.0]}
+    found = pendmap.sweep(rig, ranges | {"frequency_hz": [*UNEVEN]}, grid=16, check=False)
+    for j, k in np.ndindex(2, 3):
+        own = {**STROKE, "stroke_mm": ranges["stroke_mm"][j]}
+        same_as_alone(
+            found, {"stroke_mm": j, "frequency_hz": k}, Rig.of(**own, frequency_hz=UNEVEN[k])
+        )
     curve = {"frequency_hz": [1.2, 1.6, 2.0], "stroke_mm": [60.0, 45.0, 20.0]}
-    found = pendmap.bifurcation(Rig(w0=6.2, c_over_m=0.62, Tr=0.1), curve)
+    along = pendmap.bifurcation(rig, curve)
     each = zip(curve["stroke_mm"], curve["frequency_hz"], strict=True)
-    own = [1e-3 * mm * (2 * np.pi * hertz) ** 2 / 9.81 for mm, hertz in each]
-    assert found.p.values == pytest.approx(own)
+    own_p = [1e-3 * mm * (2 * np.pi * hertz) ** 2 / 9.81 for mm, hertz in each]
+    assert along.p.values == pytest.approx(own_p)
 
 
 def test_an_axis_may_be_any_curve(tmp_path: Path) -> None:
     source = np.random.default_rng(4)
-    curve = {"p": np.sort(source.uniform(0.2, 1.2, 4)), "omega": source.uniform(1.6, 2.4, 4)}
-    found = pendmap.sweep(
-        Pendulum(),
-        {"any": curve, "gamma": [0.1, 0.14]},
-        grid=20,
-        check=False,
-        run=pendmap.RunOptions(store=tmp_path / "a.zarr"),
-    )
+    curve = {"p": np.sort(source.uniform(0.2, 1.2, 3)), "omega": source.uniform(1.6, 2.4, 3)}
+    ranges = {"any": curve, "gamma": [0.1, 0.14]}
+    found = pendmap.sweep(Pendulum(), ranges, grid=16, check=False)
     assert found.omega.dims == ("p",)
-    for k in range(4):
+    for k in range(3):
         one = Pendulum(gamma=0.14, **{name: float(x[k]) for name, x in curve.items()})
         same_as_alone(found, {"p": k, "gamma": 1}, one)
-    diagram = pendmap.bifurcation(
-        Pendulum(), curve, run=pendmap.RunOptions(store=tmp_path / "b.zarr")
-    )
-    assert diagram.omega.values == pytest.approx(curve["omega"])
-    turned = {name: own[::-1] for name, own in curve.items()}
-    again = pendmap.bifurcation(
-        Pendulum(), {"c": turned}, run=pendmap.RunOptions(store=tmp_path / "b.zarr", resume=True)
-    )
+    run = RunOptions(store=tmp_path / "b.zarr")
+    diagram = pendmap.bifurcation(Pendulum(), curve, run=run)
+    turned = {"c": {name: own[::-1] for name, own in curve.items()}}
+    again = pendmap.bifurcation(Pendulum(), turned, run=dataclasses.replace(run, resume=True))
     assert again.identical(diagram)
     map_ = pendmap.parameter_map(Pendulum(), {"c": curve, "gamma": [0.1]})
     kinds = sorted(map_.kind.values[map_.entry_kind.values])
     pairs = [one.pair for one in attractors_of(diagram, "kind_")]  # mirror images are one in a map
     assert kinds == sorted(pairs[k] for k in diagram.entry_kind.values)
-    for bad, text in (
+
+
+@pytest.mark.parametrize(
+    ("ranges", "text"),
+    [
         ({"p": [0.1, 0.2], "omega": [2.0]}, "omega must have as many values as p, 2, got 1"),
         ({"p": [0.1, 0.3, 0.2], "omega": [1, 2, 3]}, "p must be ascending"),
         ({"p": [0.1, 0.2], "omega": [1, -2]}, "p = 0.2: omega must be a number above 0, got -2"),
         ({"c": {"p": [1, 2], "omega": np.zeros((2, 2))}}, r"omega must be an array \(N,\)"),
-    ):
-        with pytest.raises(InputError, match=text):
-            pendmap.bifurcation(Pendulum(), bad)
+    ],
+)
+def test_invalid_curves_are_refused(ranges: Any, text: str) -> None:  # noqa: ANN401
+    with pytest.raises(InputError, match=text):
+        pendmap.bifurcation(Pendulum(), ranges)

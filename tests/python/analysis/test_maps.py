@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -17,8 +18,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import pendmap
+import tiled
 from interrupted import started
-from pendmap import Grid, Pendulum, cli
+from pendmap import Grid, Pendulum, _core, cli
 from pendmap.files import facts
 
 
@@ -55,24 +57,20 @@ def smooth() -> Any:  # noqa: ANN401 (a Dataset)
     return pendmap.basins(Pendulum(p=0.6), Grid.square(60))
 
 
-def test_a_map_has_its_model_numerics_and_summary_in_its_attributes(smooth: Any) -> None:  # noqa: ANN401
+def test_a_map_has_its_model_numerics_and_shares(smooth: Any) -> None:  # noqa: ANN401
     assert smooth.label.dims == ("velocity", "theta")
-    assert smooth.theta.attrs["units"] == "rad"
     assert smooth.theta.values[0] == pytest.approx(-math.pi + math.pi / 60)
-    for key in ("gamma", "p", "omega", "phase", "torque", "tol", "pendmap_version"):
-        assert key in facts(smooth)
+    assert {"gamma", "p", "omega", "phase", "torque", "tol", "pendmap_version"} <= {*facts(smooth)}
     assert smooth["reached_error"].item() <= smooth.attrs["tol"]
     labels, counts = np.unique(smooth.label.values, return_counts=True)
     assert labels.tolist() == [1, 2, 3]
     assert counts.sum() == smooth.attrs["cells"] == 3600
-    assert smooth.fraction.values == pytest.approx(counts / 3600)
-    assert smooth.stderr.values == pytest.approx(
-        np.sqrt(counts / 3600 * (1 - counts / 3600) / 3600)
-    )
+    share = counts / 3600
+    assert smooth.fraction.values == pytest.approx(share)
+    assert smooth.stderr.values == pytest.approx(np.sqrt(share * (1 - share) / 3600))
     assert smooth.twin.values.tolist() == [1, 3, 2]
     assert (smooth.settle_periods.values > 0).all()
-    assert smooth["labels_reliable"].item() == 1
-    assert smooth["unreliable"].item() == 0
+    assert (smooth["labels_reliable"].item(), smooth["unreliable"].item()) == (1, 0)
 
 
 def test_a_list_of_starts_gives_the_labels_of_the_grid(smooth: Any) -> None:  # noqa: ANN401
@@ -81,47 +79,46 @@ def test_a_list_of_starts_gives_the_labels_of_the_grid(smooth: Any) -> None:  # 
     assert np.array_equal(listed.label.values, smooth.label.values.ravel())
 
 
+@pytest.mark.parametrize("name", ["basins", "chaos", "slow", "list"])
+def test_no_result_depends_on_the_size_of_tiles(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = tiled.case(name)
+    monkeypatch.setattr("pendmap.analysis.basin_tiles.TILE", tiled.TILE)
+    tiled.assert_same(tiled.case(name), whole)
+
+
 def test_unreliable_labels_are_reported() -> None:
     result = pendmap.basins(Pendulum(p=1.7), Grid.square(60))
     assert result["unreliable"].item() > 0.05
     assert result["labels_reliable"].item() == 0
-    for words in ("NOT RELIABLE", "equal shares by symmetry", "hardly better than chance"):
+    for words in ("NOT RELIABLE", "hardly better than chance"):
         assert words in result.attrs["summary"]
+    early = pendmap.basins(Pendulum(p=1.0), Grid.square(20), max_periods=5)
+    assert "--max-periods raises this bound" in early.attrs["summary"]
 
 
 def test_other_threads_run_and_progress_is_reported() -> None:
-    ticks: list[float] = []
-    told: list[tuple[int, int]] = []
-    stop = threading.Event()
+    ticks, told, stop = [0], [], threading.Event()
 
     def tick() -> None:
         while not stop.wait(0.005):
-            ticks.append(time.perf_counter())
+            ticks[0] += 1
 
     other = threading.Thread(target=tick)
     other.start()
     began = time.perf_counter()
-    pendmap.basins(
-        Pendulum(p=1.7),
-        Grid.square(300),
-        run=pendmap.RunOptions(progress=lambda *x: told.append(x)),
-    )
-    ended = time.perf_counter()
+    pendmap.basins(Pendulum(p=1.7), 200, progress=lambda *x: told.append(x))
+    seconds = time.perf_counter() - began
     stop.set()
     other.join()
-    during = [t for t in ticks if began < t < ended]
-    # If the lock were held all the time, almost none would run.
-    assert len(during) > (ended - began) / 0.005 / 10
+    assert ticks[0] > seconds / 0.005 / 10  # almost none if the lock were held all the time
     assert told
     assert all(0 <= done <= total for done, total in told)
 
-
-def test_an_error_in_the_callers_progress_ends_the_map() -> None:
     def fail(*_: int) -> None:
         raise RuntimeError("enough")
 
     with pytest.raises(RuntimeError, match="enough"):
-        pendmap.basins(Pendulum(p=1.7), Grid.square(700), run=pendmap.RunOptions(progress=fail))
+        pendmap.basins(Pendulum(p=1.7), 700, progress=fail)
 
 
 def test_ctrl_c_raises_keyboard_interrupt() -> None:
@@ -130,8 +127,7 @@ def test_ctrl_c_raises_keyboard_interrupt() -> None:
         "import pendmap, sys\n"
         "under_way = lambda *_: print('go', flush=True)\n"
         "try:\n"
-        "    pendmap.basins(pendmap.Pendulum(p=1.7), pendmap.Grid.square(9000), "
-        "run=pendmap.RunOptions(progress=under_way))\n"
+        "    pendmap.basins(pendmap.Pendulum(p=1.7), 9000, progress=under_way)\n"
         "except KeyboardInterrupt:\n"
         "    sys.exit(42)\n"
     )
@@ -142,55 +138,40 @@ def test_ctrl_c_raises_keyboard_interrupt() -> None:
         assert process.wait(timeout=20) == 42
 
 
-def available_paths() -> list[str]:
-    """Return the instruction sets of this processor."""
-    from pendmap import _core  # noqa: PLC0415 (only here)
+COMMANDS = (
+    "basins --p 0.6 --grid 8",
+    "map --p 0.5:0.6:2 --omega 2:2.1:2",
+    "bifurcation --vary p 0.5:0.6:2",
+    "orbit --p 0.6 --grid 8",
+    "lyapunov --p 0.6",
+    "tongues --omega 2",
+    "melnikov",
+    "simulate --until 5",
+)
 
-    return _core.simd_available()
 
-
+@pytest.mark.parametrize("words", COMMANDS)
 def test_the_option_simd_applies_to_one_command(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    words: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.delenv("PENDMAP_SIMD", raising=False)
-    for path in available_paths():
-        for words in (
-            "basins --p 0.6 --grid 8",
-            "map --p 0.5:0.6:2 --omega 2:2.1:2",
-            "bifurcation --vary p 0.5:0.6:2",
-            "orbit --p 0.6 --grid 8",
-            "lyapunov --p 0.6",
-            "tongues --omega 2",
-            "melnikov",
-            "simulate --until 5",
-        ):
-            line = ["pendmap", *words.split(), "--simd", path, "--json", "--quiet"]
-            monkeypatch.setattr(sys, "argv", line)
-            with pytest.raises(SystemExit) as end:
-                cli.run()
-            assert not end.value.code
-            assert json.loads(capsys.readouterr().out)["simd"] == path
-            assert "PENDMAP_SIMD" not in os.environ
-    monkeypatch.setenv("PENDMAP_SIMD", "mmx")
-    for words in ("basins --grid 8", "tongues --omega 2", "melnikov", "simulate", "orbit", "info"):
-        monkeypatch.setattr(sys, "argv", ["pendmap", *words.split(), "--json"])
+    def run(*more: str) -> tuple[object, Any]:
+        monkeypatch.setattr(sys, "argv", ["pendmap", *words.split(), *more, "--json", "--quiet"])
         with pytest.raises(SystemExit) as end:
             cli.run()
-        assert end.value.code == 2
-        said = capsys.readouterr()
-        assert not said.out
-        assert said.err.startswith("pendmap: PENDMAP_SIMD must be ")
-        assert said.err.endswith(", got 'mmx'\n")
-        assert said.err.count("\n") == 1
-    monkeypatch.delenv("PENDMAP_SIMD")
-    monkeypatch.setattr(sys, "argv", ["pendmap", "basins", "--simd", "mmx"])
-    with pytest.raises(SystemExit) as end:
-        cli.run()
-    assert end.value.code == 2
-    said = capsys.readouterr().err
-    assert "Invalid value for '--simd': must be one of " in said
-    assert " on this processor, got 'mmx'" in said
-    assert said.count("\n") == 1
+        return end.value.code or 0, capsys.readouterr()
+
+    monkeypatch.delenv("PENDMAP_SIMD", raising=False)
+    for path in _core.simd_available():
+        code, said = run("--simd", path)
+        assert (code, json.loads(said.out)["simd"]) == (0, path)
+        assert "PENDMAP_SIMD" not in os.environ
+    code, said = run("--simd", "mmx")
+    assert code == 2
+    assert re.fullmatch(r".*--simd': must be one of .* on this processor, got 'mmx'\n", said.err)
+    monkeypatch.setenv("PENDMAP_SIMD", "mmx")
+    code, said = run()
+    assert (code, said.out) == (2, "")
+    assert re.fullmatch("pendmap: PENDMAP_SIMD must be .*, got 'mmx'\n", said.err)
 
 
 @pytest.mark.parametrize(
@@ -226,11 +207,3 @@ def test_slow_settling_is_not_called_chaos(p: float) -> None:
     )
     assert not [kind for kind in result.kind.values.tolist() if "chaos" in kind]
     assert result["undecided"].item() > 0.5
-
-
-def test_starts_on_an_unstable_rest_are_named() -> None:
-    alone = pendmap.basins(Pendulum(p=1.0), Grid.square(1))
-    assert "start exactly at an unstable equilibrium" in alone.attrs["summary"]
-    assert "--max-periods" not in alone.attrs["summary"]
-    early = pendmap.basins(Pendulum(p=1.0), Grid.square(20), max_periods=5)
-    assert "--max-periods raises this bound" in early.attrs["summary"]

@@ -75,4 +75,4 @@ def test_starts_tell_what_they_may_miss() -> None:
     found = pendmap.bifurcation(Pendulum(), {"p": [0.8, 0.9]})
     assert float(found.missed) == pytest.approx(1 - 0.05 ** (1 / 9))
     assert "9 starts a value may miss attractors with 28.3 % of the box" in found.summary
-    assert "with 15.3 % (95 %)" in found.summary
+    assert "all with 15.3 % (95 %)" in found.summary

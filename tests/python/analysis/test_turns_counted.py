@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -11,12 +10,8 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import pendmap
-from drawn import made
 from pendmap import InputError
 from pendmap.charts import legend
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 WINDOW = pendmap.Grid((-25.0, 25.0, 50), (-4.0, 4.0, 20))
 
@@ -87,6 +82,8 @@ def test_a_formula_is_mapped_as_the_effect_of_the_library() -> None:
         for effect in (spring(0.05), own)
     )
     assert len(one["attractor"]) > 3
+    colours = legend.colours_of(one)  # attractors around different turns differ in colour
+    assert len(set(colours)) == len(colours)
     np.testing.assert_array_equal(one["label"], other["label"])
 
 
@@ -100,20 +97,6 @@ def test_friction_holds_the_pendulum_in_the_wells_of_several_turns() -> None:
     still = pendmap.basins_of(model, [6.0, -6.0, 0.0], [0.0, 0.0, 0.0])
     names = [str(still["attractor"].values[i - 1]) for i in still["label"].values]
     assert names == ["rest turn +1", "rest turn -1", "rest"]
-
-
-def test_a_figure_marks_each_attractor_where_it_is_alone(tmp_path: Path) -> None:
-    found = pendmap.basins(pendmap.Pendulum(gamma=0.2, p=0.8, effects=(spring(0.05),)), WINDOW)
-    pendmap.save(found, tmp_path / "line.nc")
-    again = pendmap.load(tmp_path / "line.nc")
-    assert again.attrs["angle"] == "line"
-    axes = made(again).axes[0]
-    assert axes.get_xlim() == (-25.0, 25.0)
-    marked = np.concatenate([line.get_xdata() for line in axes.lines])
-    np.testing.assert_allclose(np.sort(marked), np.sort(found["point_theta"].values))
-    # Attractors around different turns differ in colour.
-    colours = legend.colours_of(found)
-    assert len(set(colours)) == len(colours)
 
 
 def test_an_analysis_that_needs_a_periodic_angle_is_refused() -> None:

@@ -9,5 +9,4 @@ import tiled
 
 @pytest.fixture(autouse=True)
 def _small_tiles(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in ("basins", "lifetime"):
-        monkeypatch.setattr(f"pendmap.analysis.{module}.TILE", tiled.TILE)
+    monkeypatch.setattr("pendmap.analysis.basin_tiles.TILE", tiled.TILE)

@@ -39,7 +39,7 @@ def kept(**keep: Any) -> xr.Dataset:  # noqa: ANN401 (of a run)
 
 @pytest.fixture(autouse=True)
 def _tiny_tiles(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pendmap.analysis.basins.TILE", 100)
+    monkeypatch.setattr("pendmap.analysis.basin_tiles.TILE", 100)
 
 
 def same_or_refused(call: Callable[[], xr.Dataset], truth: xr.Dataset) -> bool:

@@ -1,1 +1,0 @@
-"""Sweeps of basin maps: their tiles, the matching of attractors, their table and their report."""
