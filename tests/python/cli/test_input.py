@@ -46,22 +46,12 @@ def test_invalid_axes_are_refused(axis: tuple[Any, Any, Any]) -> None:
         Axis(*axis)
 
 
-def test_axes_may_be_tuples_and_counts_numpy_integers() -> None:
-    grid = Grid((0, 1, 5), (np.float32(0), 1, np.int32(5)))  # type: ignore[arg-type]
-    assert grid == Grid(Axis(0, 1, 5), Axis(0, 1, 5))
-    assert type(grid.velocity.count) is int
-    with pytest.raises(InputError, match=r"velocity must be an Axis, like .*, got 5"):
-        Grid(Axis(0, 1, 5), 5)  # type: ignore[arg-type]
-
-
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
         ({"grid": 1.5}, r"grid must be a Grid, like 100, Grid\.square\(100\) .*, got 1\.5"),
         ({"pendulum": 0.6}, "pendulum must be a Pendulum, .*, got 0.6"),
-        ({"tol": "a"}, "tol must be a number, got 'a'"),
         ({"max_periods": 10**14}, "max_periods must be a whole number from 1 to 2147.*, got 1"),
-        ({"layer_periods": 0}, "layer_periods must be .*, got 0"),
         ({"check": "no"}, "check must be True or False, got 'no'"),
     ],
 )
@@ -70,23 +60,14 @@ def test_basins_names_what_it_refuses(words: dict[str, Any], complaint: str) -> 
         pendmap.basins(**({"pendulum": Pendulum(), "grid": Grid.square(5)} | words))
 
 
-def test_basins_takes_whole_numbers_of_numpy() -> None:
-    two: Any = np.int64(2)
-    run = pendmap.RunOptions(threads=two, seed=two)
-    result = pendmap.basins(Pendulum(), Grid.square(np.int16(4)), max_periods=two, run=run)
-    assert result.attrs["max_periods"] == result.attrs["threads"] == result.attrs["seed"] == 2
-
-
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
         ({"theta": "pi"}, "theta must be a number, got 'pi'"),
-        ({"until": None}, "until must be .*, got None"),
         (
             {"until": 1e12},
             r"must be a time up to \d.*, got 1e\+12: .* periods do not fit into memory",
         ),
-        ({"samples": 2.5}, "samples must be .*, got 2.5"),
         ({"lyapunov": 1}, "lyapunov must be .*, got 1"),
     ],
 )
