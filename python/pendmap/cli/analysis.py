@@ -140,10 +140,7 @@ _ENTRIES: Final = {
     ),
     "orbit": Entry(
         "Find all periodic orbits of period n and w net turns, stable and unstable.",
-        (
-            "pendmap orbit --p 1.3 --n 2 --w 0",
-            "pendmap orbit --p 1 --n 1 --w 1 --theta-r 0.05",
-        ),
+        ("pendmap orbit --p 1.3 --n 2 --w 0", "pendmap orbit --p 1 --n 1 --w 1 --theta-r 0.05"),
         example="--n 2 --w 0",
         window=("-pi:pi:200", "depends on n, w and p"),
     ),
@@ -186,10 +183,7 @@ _ENTRIES: Final = {
         First order, with Coulomb friction and effects. A torque that keeps up a rotation tilts the
         potential: the threshold is that of the loop of upright rest.
         """,
-        (
-            "pendmap melnikov --omega 1 --theta-r 0.02",
-            "pendmap melnikov --torque 0.2 --json",
-        ),
+        ("pendmap melnikov --omega 1 --theta-r 0.02", "pendmap melnikov --torque 0.2 --json"),
     ),
 }
 """By command; an analysis without an entry has what its signature and its description say."""
@@ -236,8 +230,8 @@ def command_of(name: str) -> click.Command:
             raise KeyboardInterrupt
 
     names = [n for n, one in declared.items() if one.is_option and n not in entry.left_out]
-    own = next((n for n in names if n not in GROUPS), None)
-    example = entry.example or f"--{own} {declared[own].default}" if own else ""
+    first = next((n for n in names if n not in GROUPS), None)
+    example = entry.example or f"--{first} {declared[first].default}" if first else ""
     parts = [entry.model, *entry.further]
     if entry.window:
         parts.append(window_options(*entry.window))

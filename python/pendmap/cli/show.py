@@ -97,19 +97,19 @@ def forecast(say: Callable[[str], object]) -> Callable[[int, int], None]:
     """
     began = since = time.monotonic()
     last = first = most = 0
-    told = False
+    announced = False
 
     def report(done: int, total: int) -> None:
-        nonlocal since, last, first, most, told
+        nonlocal since, last, first, most, announced
         now = time.monotonic()
         if total != most or done < last:
             since, most, first = now, total, done
         last = done
-        if told or now - since < _SOON[0] or done - first < max(_SOON[1] * total, 1):
+        if announced or now - since < _SOON[0] or done - first < max(_SOON[1] * total, 1):
             return
         left = (now - since) * (total - done) / (done - first)
-        told = left > _LONG
-        if told:
+        announced = left > _LONG
+        if announced:
             say(f"This takes about {duration(now - began + left)}.")
 
     return report
@@ -162,7 +162,7 @@ class Outputs:
         elif "rerun" in wanted and importlib.util.find_spec("rerun") is None:
             wanted.remove("rerun")
             left_out = f"{name}.rrd"
-        free, kept = free_name(name, [_ENDS[kind] for kind in wanted], overwrite=overwrite)
+        free, there = free_name(name, [_ENDS[kind] for kind in wanted], overwrite=overwrite)
         defaults = [File(kind, default_file(free + _ENDS[kind])) for kind in wanted]
         every = sorted([*files, *defaults], key=lambda file: [*_ENDS].index(file.kind))
         keep_inputs(reads, every)
@@ -173,7 +173,7 @@ class Outputs:
 
             with named("--view"):
                 viewer.check_display()
-        return cls(tuple(every), **switches, left_out=left_out, kept=kept)
+        return cls(tuple(every), **switches, left_out=left_out, kept=there)
 
     def path(self, kind: str) -> Path | Address | None:
         """Return the first file of a kind."""
