@@ -102,15 +102,6 @@ def test_only_results_are_saved(tmp_path: Path) -> None:
 # Statements of summaries
 
 
-def test_the_summary_states_the_interval_of_an_exponent() -> None:
-    pendulum = Pendulum(p=1.7)
-    run = pendmap.simulate(pendulum, math.pi / 2, 0, 200, lyapunov=True)
-    assert run["exponent_from"].item() == pytest.approx(20, abs=0.2)
-    assert 190 < run["exponent_to"].item() <= 200
-    for words in ("of this stretch, tau = 19.9295 to 199.589", "Transients are included"):
-        assert words in run.attrs["summary"]
-
-
 def test_a_missed_tolerance_is_reported() -> None:
     # Rounding errors, magnified by chaos, exceed it.
     missed = pendmap.simulate(Pendulum(p=5, omega=0.5), 1, 0, 100, tol=1e-13)
@@ -120,19 +111,6 @@ def test_a_missed_tolerance_is_reported() -> None:
     far, near = (pendmap.simulate(Pendulum(), 1 + turns, 0, 10) for turns in (2000 * math.pi, 0))
     assert abs(far.theta[-1] - near.theta[-1] - 2000 * math.pi) < 1e-8
     assert "TOLERANCE" not in pendmap.simulate(Pendulum(), 1, 0, 10).attrs["summary"]
-
-
-def test_a_map_without_decided_cells_has_a_short_summary() -> None:
-    result = pendmap.basins(Pendulum(), Grid.square(8), max_periods=1)
-    summary = result.attrs["summary"]
-    assert "100 % of the starts undecided within 1 period; --max-periods raises" in summary
-    for words in ("agree", "sampled labels", "1 periods"):
-        assert words not in summary
-    one = pendmap.basins(
-        Pendulum(), Grid(Axis(0.5, 0.6, 1), Axis(0, 1, 1)), run=pendmap.RunOptions(threads=1)
-    )
-    assert "\n1 start, " in one.attrs["summary"]
-    assert "on 1 thread (" in one.attrs["summary"]
 
 
 def test_a_bound_that_was_shortened_because_of_chaos_is_explained() -> None:

@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 import pendmap
 from models import DRAG, SWING
 from pendmap import Effect, InputError, Pendulum, Rig
-from pendmap.units import Units
 
 sizes = st.floats(1e-3, 1e3)
 signed = st.floats(-1e3, 1e3)
@@ -45,18 +44,6 @@ def test_times_torques_and_effects_have_their_powers_of_w0() -> None:
     harmonic, drag = pendulum.effects
     assert harmonic.parameters == {"amplitude": 2.0, "n": 3.0, "psi": 0.5}
     assert drag.parameters == DRAG.parameters
-
-
-@pytest.mark.parametrize("effect", pendmap.effects(), ids=lambda effect: effect.name)
-def test_every_effect_converts_by_its_powers_of_w0(effect: pendmap.EffectDefinition) -> None:
-    values = {p.name: float(np.mean(np.clip(p.typical, *p.range))) for p in effect.parameters}
-    bare = Effect(effect.name, values)
-    in_si = bare.given(Units(3.0, si=True))
-    for p in effect.parameters:
-        power = p.power_of_w0 - (values[p.power_of_w0_less] if p.power_of_w0_less else 0)
-        assert in_si.parameters[p.name] == values[p.name] * 3.0**power
-    back = in_si.bare(Units(3.0, si=True))
-    assert list(back.parameters.values()) == pytest.approx(list(values.values()), rel=1e-14)
 
 
 @given(
