@@ -116,7 +116,7 @@ fn a_formula_s_maps_are_the_library_s_cell_for_cell() {
         for (kind, library, own) in twins(&base).into_iter().step_by(every) {
             if own.check_mappable().is_ok() {
                 // If a corner moves the end of each rest, the release is searched step by step.
-                let side = if library.has_corner() && theta_r > 0.0 { 6 } else { 24 };
+                let side = if library.has_corner() && theta_r > 0.0 { 5 } else { 15 };
                 let [a, b] = [&library, &own].map(|pendulum| basins_on_plane(pendulum, side));
                 let (a, b) = (cell_names(&a), cell_names(&b));
                 let apart = a.iter().zip(&b).filter(|(a, b)| a != b).count();

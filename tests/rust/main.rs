@@ -4,7 +4,7 @@
 //! - [`exact`], [`convergence_order`]: solutions in closed form, energy, order of convergence
 //! - [`stick_slip`], [`free_decay`], [`edge_cases`]: friction, event by event, and cases sensitive
 //!   to rounding
-//! - [`sensitivity`], [`recorded`]: derivatives through events, recorded pivot motions
+//! - [`recorded`]: recorded pivot motions
 //! - [`effects`]: the library, every property of each effect
 //! - [`formulas`]: user-defined effects; [`effects_as_formulas`]: the library's as formulas
 //! - [`fit`], [`fit_derivatives`], [`fit_ends`], [`fit_quantised`]: parameters from records; [`replay`]: ensembles
@@ -53,7 +53,6 @@ mod parameter_maps;
 mod properties;
 mod recorded;
 mod replay;
-mod sensitivity;
 mod sine;
 mod special_cases;
 mod stick_slip;

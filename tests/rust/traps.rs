@@ -22,9 +22,9 @@ fn inside(ellipse: &Ellipse) -> Vec<State> {
         [ellipse.centre[0] + (radius * angle.cos() - b * dv) / a, ellipse.centre[1] + dv]
     };
     let edge = (0..64).map(|k| at(0.999, TAU * f64::from(k) / 64.0));
-    let area = (0..100).map(|k| {
+    let area = (0..40).map(|k| {
         let k = f64::from(k);
-        at(((k + 0.5) / 100.0).sqrt(), TAU * (k * 0.618_033_988_749_895).fract())
+        at(((k + 0.5) / 40.0).sqrt(), TAU * (k * 0.618_033_988_749_895).fract())
     });
     edge.chain(area).collect()
 }
@@ -177,10 +177,10 @@ fn within(band: &Band) -> Vec<State> {
         let k = f64::from(k);
         let theta = TAU * ((k * 0.618_033_988_749_895).fract() - 0.5);
         let side = 2.0 * (k * 0.754_877_666_246_693).fract() - 1.0;
-        let side = if k < 200.0 { 0.999 * side.signum() } else { side };
+        let side = if k < 100.0 { 0.999 * side.signum() } else { side };
         [theta, band.at(theta) + side * band.half_width]
     };
-    (0..400).map(state).collect()
+    (0..200).map(state).collect()
 }
 
 #[test]

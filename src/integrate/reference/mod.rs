@@ -7,7 +7,7 @@
 //! - [`corner`]: corners within a step, where the formula of an effect changes
 //! - [`event`]: the reported turns, sticks and releases of a trajectory
 //! - [`rig_mode`]: a mode of the rig coupled to the pendulum
-//! - [`sample`], [`sensitivity`]: a trajectory at given times, with derivatives by parameters and start
+//! - [`sample`]: a trajectory at given times
 //! - [`flow`]: the stroboscopic map with its derivative
 
 pub mod corner;
@@ -18,5 +18,4 @@ pub mod flow;
 pub mod problem;
 pub mod rig_mode;
 pub mod sample;
-pub mod sensitivity;
 pub mod turning;
