@@ -65,19 +65,11 @@ if TYPE_CHECKING:
     __version__: str
 
 ANALYSES = {
-    "trajectory": (
-        "simulate",
-        ["simulate"],
-        "Integrate one trajectory, with its Poincaré section.",
-    ),
+    "trajectory": ("simulate", ["simulate"], "Integrate one motion, with its Poincaré section."),
     "basins": ("basins", ["basins", "basins_of"], "Map the basins of attraction."),
     "basin_sweep": ("sweep", ["sweep"], "Map basins along one or two parameters."),
     "parameter_map": ("map", ["parameter_map"], "Map which attractors exist over two parameters."),
-    "bifurcation": (
-        "bifurcation",
-        ["bifurcation"],
-        "Draw stroboscopic points against a parameter.",
-    ),
+    "bifurcation": ("bifurcation", ["bifurcation"], "Draw stroboscopic points along a parameter."),
     "orbits": ("orbit", ["orbit"], "Find all periodic orbits of one period and winding."),
     "lyapunov": ("lyapunov", ["lyapunov"], "Find the largest Lyapunov exponent of an attractor."),
     "lifetime": ("lifetime", ["lifetime"], "Measure how long transient chaos lives."),

@@ -15,8 +15,6 @@ MOST: Final = 500  # Largest length of a message, characters
 
 def escaped(text: str) -> str:
     """Return a text whose control characters are escapes, line ends excepted."""
-    if text.isprintable():
-        return text
     return "".join(
         c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text
     )
@@ -126,16 +124,12 @@ def check_number(name: str, value: object) -> float:
 
 def check_whole(name: str, value: object, least: int, most: int) -> int:
     """Return a whole number from ``least`` to ``most`` as an int; refuse 2.0 and ``bool``."""
-    value = _bare(value)
-    if (
-        isinstance(value, bool)
-        or not isinstance(value, numbers.Integral)
-        or not least <= int(value) <= most
-    ):
-        raise InputError(
-            f"{name} must be a whole number from {least} to {most}, got {short_repr(value)}"
-        )
-    return int(value)
+    given = _bare(value)
+    whole = isinstance(given, numbers.Integral) and not isinstance(given, bool)
+    if not (whole and least <= int(given) <= most):
+        wanted = f"a whole number from {least} to {most}"
+        raise InputError(f"{name} must be {wanted}, got {short_repr(given)}")
+    return int(given)
 
 
 def shown_key(key: object) -> str:

@@ -12,7 +12,7 @@ import textwrap
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Sequence
 
     Table = tuple[Sequence[str], Sequence[Sequence[str]]]
 
@@ -109,24 +109,19 @@ class Readable(abc.ABC):
 
 def wrapped(text: str, width: int = WIDTH) -> str:
     """Break lines longer than ``width`` columns between words; what follows is indented by two."""
-
-    def lines(line: str) -> Iterator[str]:
-        start = line[: len(line) - len(line.lstrip())]
+    lines = []
+    for line in text.split("\n"):
         if len(_STYLE.sub("", line)) <= width:
-            yield line
-            return
+            lines.append(line)
+            continue
+        start = line[: len(line) - len(line.lstrip())]
         whole = _GLUED.sub(_GLUE, line.strip())  # a number and its unit stay together
+        further: dict[str, Any] = {"break_long_words": False, "break_on_hyphens": False}
         parts = textwrap.wrap(
-            whole,
-            width,
-            initial_indent=start,
-            subsequent_indent=start + "  ",
-            break_long_words=False,
-            break_on_hyphens=False,
+            whole, width, initial_indent=start, subsequent_indent=f"{start}  ", **further
         )
-        yield from (part.replace(_GLUE, " ") for part in parts)
-
-    return "\n".join(part for line in text.split("\n") for part in lines(line))
+        lines += [part.replace(_GLUE, " ") for part in parts]
+    return "\n".join(lines)
 
 
 def columns(head: Sequence[str], rows: Sequence[Sequence[str]], width: int = WIDTH) -> str:
@@ -182,9 +177,8 @@ def interval(estimate: Estimate) -> str:
     if estimate.ci95 is None:
         return ""
     low, high = estimate.ci95
-    error = estimate.stderr
-    if error is None or not math.isfinite(error) or error <= 0:
-        error = (high - low) / 4
+    error = estimate.stderr or 0.0
+    error = error if 0 < error < math.inf else (high - low) / 4
     places = _places(error) if 0 < error < math.inf else 0
     if not 0 < places <= MOST_PLACES:
         return f"[{low:.6g}, {high:.6g}]"
@@ -200,12 +194,11 @@ def estimate_text(estimate: Estimate) -> str:
     if error is None and estimate.ci95 is not None and estimate.ci95[0] == value:
         return f"{value:.{DIGITS}g} (below {estimate.ci95[1]:.{ERROR_DIGITS}g})"
     text = f"{value:.{DIGITS}g}"
-    if error is not None and math.isfinite(error) and error > 0:
+    if error is not None and 0 < error < math.inf:
         places = _places(error)
         if 0 < places <= MOST_PLACES:
-            text = f"{value:.{places}f}({round(error * 10**places)})"
-        else:
-            text += f" +- {error:.{ERROR_DIGITS}g}"
+            return f"{value:.{places}f}({round(error * 10**places)})"
+        text += f" +- {error:.{ERROR_DIGITS}g}"
     return text
 
 

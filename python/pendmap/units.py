@@ -9,8 +9,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 
-TIME, VELOCITY, RATE = -1, 1, 1
-"""Powers of ``w0`` of a time, a velocity, and a rate like a Lyapunov exponent."""
+TIME, VELOCITY, RATE = -1, 1, 1  # Powers of ``w0`` of a time, a velocity and an exponent
 
 
 class _Word:

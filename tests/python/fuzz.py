@@ -28,8 +28,11 @@ import traceback
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
+import click
+
 import fuzz_cases
 from pendmap.cli import run as run_command
+from pendmap.cli.main import command
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -69,7 +72,7 @@ def import_all() -> None:
     """Import the modules of the cases once; every case is a fork of this process."""
     os.environ["MPLBACKEND"] = "agg"
     for name in fuzz_cases.SMALL:
-        importlib.import_module(f"pendmap.cli.{name}")
+        command.get_command(click.Context(command), name)
     for name in ("render", "viewer", "identification", "diagnosis", "virtual_rig", "records"):
         importlib.import_module(f"pendmap.{name}")
     for name in ("zarr", "scipy.signal", "scipy.optimize", "pyarrow.parquet"):

@@ -41,7 +41,7 @@ with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
     run("rig", "free_decay", "--out", "decay")
     run("identify", "decay", "--out", "rig.toml", "--plot", "identify.svg")
     run("basins", "--model", "rig.toml", "--grid", "20", "--out", "rig.nc")
-    run("diagnose", "decay", "--max-effects", "0", "--report", "report")
+    run("diagnose", "decay", "--max-effects", "0", "--report", "report.html")
     names = {"basins.nc", "basins.png", "simulate.nc", "simulate.png", "rig.toml", "identify.svg"}
-    assert Path("report", "report.html").exists()
+    assert Path("report.html").exists()
     assert names <= {path.name for path in Path().iterdir()}

@@ -13,6 +13,7 @@ from pathlib import Path
 import click
 import pytest
 
+import pendmap
 from pendmap import _core
 from pendmap.cli.main import command
 
@@ -106,8 +107,9 @@ def test_only_fronts_list_their_exports() -> None:
 
 
 @pytest.mark.parametrize("name", command.list_commands(click.Context(command)))
-def test_a_command_is_a_module_of_its_name(name: str) -> None:
-    assert (PACKAGE / "cli" / f"{name}.py").exists()
+def test_a_command_is_an_analysis_or_a_module_of_its_name(name: str) -> None:
+    analysis = name in {command for command, *_ in pendmap.ANALYSES.values()}
+    assert analysis != (PACKAGE / "cli" / f"{name}.py").exists()
 
 
 def test_every_parameter_of_an_effect_has_a_role_and_a_unit() -> None:

@@ -1,4 +1,4 @@
-"""The how-tos of CONTRIBUTING.md: an effect takes four files, an analysis five, a chart one.
+"""The how-tos of CONTRIBUTING.md: an effect and an analysis take four files, a chart one.
 
 The test of the chart is in test_charts.py.
 """
@@ -161,19 +161,6 @@ def swing(pendulum, largest: float = 3.0):
     summarised(dataset, [said], pendulum, "the period is")
     return dataset
 '''
-COMMAND = '''
-"""``pendmap swing``: period against amplitude."""
-
-from pendmap.cli.analysis import analysis_command
-
-
-@analysis_command(
-    "swing", "largest", example="--largest 2", examples=("pendmap swing --largest 2",)
-)
-def command(*_, **given):
-    """Compute the period of free swings against their amplitude."""
-    return given
-'''
 CHART = '''
 """Period of free swings against their amplitude."""
 
@@ -208,13 +195,12 @@ def test_a_dataset_is_saved_and_read():
 """
 
 
-def test_an_analysis_is_five_files(tmp_path: Path) -> None:
+def test_an_analysis_is_four_files(tmp_path: Path) -> None:
     copy = tmp_path / "python" / "pendmap"
     shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
     front = (PACKAGE / "__init__.py").read_text(encoding="utf-8")
     files = {
         "python/pendmap/analysis/swing.py": ANALYSIS,
-        "python/pendmap/cli/swing.py": COMMAND,
         "python/pendmap/__init__.py": front.replace("ANALYSES = {", TABLE),
         "python/pendmap/charts/swing.py": CHART,
         "tests/python/analysis/test_swing.py": TEST,
@@ -233,9 +219,9 @@ def test_an_analysis_is_five_files(tmp_path: Path) -> None:
         if not (old := PACKAGE / path.relative_to(copy)).exists()
         or not filecmp.cmp(path, old, shallow=False)
     ]
-    assert len(changed) + 1 == len(files) == 5
+    assert len(changed) + 1 == len(files) == 4
     core = how_to("Add an analysis").split("With a core in Rust")[1]
-    assert len(files) + len(re.findall(r"`\S+`", core)) == 9
+    assert len(files) + len(re.findall(r"`\S+`", core)) == 8
 
     def run(*words: str) -> str:
         environment = os.environ | {"PYTHONPATH": str(copy.parent)}

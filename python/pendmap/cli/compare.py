@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import functools
 from typing import TYPE_CHECKING, Any
 
-from pendmap.cli.parse.groups import argument, group, new_command
 from pendmap.cli.parse.model_options import rig_from
-from pendmap.cli.parse.options import output_options, simd_option
+from pendmap.cli.parse.options import argument, group, new_command, output_options, simd_option
 from pendmap.cli.parse.signature import options_of
-from pendmap.cli.show import Outputs, write_all
-from pendmap.cli.text import first_of_all
+from pendmap.cli.show import Outputs, first_of_all
 from pendmap.errors import instruction_set
 
 if TYPE_CHECKING:
@@ -49,16 +46,16 @@ def command(
     """
     from pendmap.comparison import Ensemble, compare
     from pendmap.comparison.experiment import as_json, in_short
-    from pendmap.files.dataset import save
     from pendmap.records import files_of, read_experiment
 
-    outputs = Outputs.take(given, "compare", reads=[model, *files_of(path)])
+    reads = [model, *files_of(path)]
+    outputs = Outputs.take(given, "compare", reads, default=("out", "plot"))
     rig = rig_from(model)
     ensemble = Ensemble(**given)
     with outputs.progress("compare") as progress:
         experiment = read_experiment(path, rate_hz=rate_hz)
         comparison = compare(rig, experiment, ensemble=ensemble, threads=threads, progress=progress)
-    written = write_all(outputs.files(comparison, functools.partial(save, comparison)), keep=True)
+    written = outputs.write(comparison, keep=True)
     more = {"model": str(model), "simd": instruction_set()}
     lines = first_of_all(comparison, [*in_short(comparison), ""])
     outputs.finish(written, lambda: as_json(comparison) | more, lines)

@@ -5,30 +5,27 @@ from __future__ import annotations
 import functools
 import itertools
 import os
-import shlex
-import sys
 from typing import TYPE_CHECKING, Any
 
-from pendmap.cli.parse.groups import OUTPUT, argument, group, new_command
+from pendmap.cli.parse import options
 from pendmap.cli.parse.model_options import rig_from
-from pendmap.cli.parse.options import RESULTS, option, output_options, simd_option
+from pendmap.cli.parse.options import argument, option
 from pendmap.cli.parse.signature import options_of
-from pendmap.cli.parse.types import EFFECT, FILE, REPORT, REPORTS
-from pendmap.cli.show import Outputs, write_all
-from pendmap.cli.text import table
+from pendmap.cli.parse.types import EFFECT, FILE, REPORTS, output_file
+from pendmap.cli.show import Outputs, command_line, table
 from pendmap.errors import instruction_set, named
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 
-_FIT = group("Candidates", "--max-effects 1 --without magnet")
+_FIT = options.group("Candidates", "--max-effects 1 --without magnet")
 
 
-@new_command(
+@options.new_command(
     "diagnose",
     "pendmap diagnose hidden",
-    "pendmap diagnose hidden --model rig.toml --report report",
+    "pendmap diagnose hidden --model rig.toml --report report.html",
 )
 @argument("path", "EXPERIMENT")
 @options_of(
@@ -44,24 +41,21 @@ _FIT = group("Candidates", "--max-effects 1 --without magnet")
     "Further candidates: [[formula]] of a .toml.",
     group=_FIT,
 )
-@simd_option
+@options.simd_option
 @option(
     "--report",
-    REPORT,
-    "Report: .html with embedded figures, .md with separate figures, or a folder with both.",
-    metavar="FILE|DIR",
-    group=OUTPUT,
+    output_file(*REPORTS),
+    "Report: .html with embedded figures, or .md with separate figures.",
+    group=options.OUTPUT,
 )
-@output_options((".toml", RESULTS[0], *REPORTS), json="; alone, no file but the model")
-def command(  # noqa: PLR0913 (an option each)
+@options.output_options((".toml", ".nc", *REPORTS), json="; alone, no file but the model")
+def command(
     *,
     path: Path,
     model: Path | None,
-    max_effects: int,
-    without: tuple[str, ...],
     formulas: Path | None,
     rate_hz: float | None,
-    **given: Any,  # noqa: ANN401 (outputs)
+    **given: Any,  # noqa: ANN401 (outputs, candidates)
 ) -> None:
     """Find where a model and an experiment disagree, and which effect is missing.
 
@@ -74,7 +68,6 @@ def command(  # noqa: PLR0913 (an option each)
     # The matrices are tall and narrow: threads would cost more than they save.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from pendmap.diagnosis import diagnose, diagnosed_model
-    from pendmap.diagnosis.candidates import checked_own
     from pendmap.diagnosis.result import as_text, ranking_table
     from pendmap.diagnosis.summary import as_json
     from pendmap.model import load_formulas, save_model
@@ -82,30 +75,21 @@ def command(  # noqa: PLR0913 (an option each)
     from pendmap.records import files_of, read_experiment
 
     effects = [] if formulas is None else load_formulas(formulas)
-    with named(str(formulas)):
-        checked_own(effects)
     with named("--without"):
-        for name in {*without} - {formula.name for formula in effects}:
+        for name in {*given["without"]} - {formula.name for formula in effects}:
             definition(name)
     reads = [*files_of(path), model, formulas]
-    outputs = Outputs.take(given, "diagnose", ".toml", reads)
+    usual = ("model", "plot", "report", "rerun")
+    outputs = Outputs.take(given, "diagnose", reads, default=usual, always=("model",))
     baseline = None if model is None else rig_from(model)
     with outputs.progress("read"):
         experiment = read_experiment(path, rate_hz=rate_hz)
     with outputs.progress("diagnose") as progress:
-        result = diagnose(
-            experiment,
-            model=baseline,
-            max_effects=max_effects,
-            without=without,
-            effects=effects,
-            progress=progress,
-        )
+        result = diagnose(experiment, model=baseline, effects=effects, progress=progress, **given)
     with outputs.progress("write"):
-        line = "pendmap " + shlex.join(sys.argv[1:])
+        line = command_line()
         save = functools.partial(save_model, diagnosed_model(result, line))
-        files = outputs.files(result, save)
-        written = write_all(files, keep=True)
-    more = {"model": written.name(outputs.out), "simd": instruction_set()}
+        written = outputs.write(result, save, keep=True)
+    more = {"model": written.name(outputs.path("model")), "simd": instruction_set()}
     lines = itertools.chain(as_text(result), ["", table(*ranking_table(result))])
     outputs.finish(written, lambda: as_json(result) | more, lines)

@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.cli.parse.groups import OUTPUT, argument, new_command
-from pendmap.cli.parse.options import flag, option
+from pendmap.cli.parse.options import OUTPUT, argument, flag, new_command, option
 from pendmap.cli.parse.types import EFFECT, FILE
-from pendmap.cli.text import say, write_json
+from pendmap.cli.show import say, write_json
 from pendmap.errors import escaped
 from pendmap.files import toml_text
 

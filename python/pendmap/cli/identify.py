@@ -3,26 +3,20 @@
 from __future__ import annotations
 
 import functools
-import shlex
-import sys
 from typing import TYPE_CHECKING, Any
 
-from pendmap.cli.parse.groups import OUTPUT, argument, group, new_command
-from pendmap.cli.parse.options import RESULTS, flag, output_options, simd_option
+from pendmap.cli.parse import options
+from pendmap.cli.parse.options import argument, flag
 from pendmap.cli.parse.signature import options_of
 from pendmap.cli.parse.types import EFFECT, METHOD
-from pendmap.cli.show import Outputs, Written, write_all
-from pendmap.cli.text import first_of_all
+from pendmap.cli.show import Outputs, Written, command_line, first_of_all
 from pendmap.errors import InputError, instruction_set
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 
-SUFFIX = ".toml"
-
-
-@new_command(
+@options.new_command(
     "identify",
     "pendmap identify run.csv",
     "pendmap identify decay --effect quadratic_drag --out rig.toml --out rig.pdf",
@@ -32,13 +26,17 @@ SUFFIX = ".toml"
 @options_of(
     "identification.experiment.identify",
     "method=methods effect=effects rate=rate_hz",
-    group("Fit", "--effect quadratic_drag"),
+    options.group("Fit", "--effect quadratic_drag"),
     methods=METHOD,
     effects=EFFECT,
 )
-@simd_option
-@output_options((SUFFIX, RESULTS[0]))
-@flag("--verbose", "Also the tables of all methods, intervals, and what was noticed.", group=OUTPUT)
+@options.simd_option
+@options.output_options((".toml", ".nc"))
+@flag(
+    "--verbose",
+    "Also the tables of all methods, intervals, and what was noticed.",
+    group=options.OUTPUT,
+)
 def command(
     *,
     path: Path,
@@ -61,25 +59,23 @@ def command(
     from pendmap.model import save_model
     from pendmap.records import files_of, read_experiment
 
-    outputs = Outputs.take(given, "identify", SUFFIX, files_of(path))
+    outputs = Outputs.take(given, "identify", files_of(path), default=("model", "plot", "rerun"))
     with outputs.progress("read"):
         experiment = read_experiment(path, rate_hz=rate_hz)
     with outputs.progress("identify") as progress:
         report = identify(experiment, methods=methods or None, effects=effects, progress=progress)
 
     def finish(written: Written) -> None:
-        more = {"model": written.name(outputs.out), "simd": instruction_set()}
+        more = {"model": written.name(outputs.path("model")), "simd": instruction_set()}
         short = [*in_short(report)]
         lines = first_of_all(report, [*short, ""]) if verbose else short
         outputs.finish(written, lambda: as_json(report) | more, lines)
 
     try:
-        model = identified_model(report, "pendmap " + shlex.join(sys.argv[1:]))
+        model = identified_model(report, command_line())
     except InputError:
         finish(Written())
         raise
     with outputs.progress("write"):
-        save = functools.partial(save_model, model)
-        files = outputs.files(report, save)
-        written = write_all(files, keep=True)
+        written = outputs.write(report, functools.partial(save_model, model), keep=True)
     finish(written)

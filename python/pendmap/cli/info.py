@@ -9,8 +9,7 @@ import platform
 
 import click
 
-from pendmap.cli.parse.groups import OUTPUT, new_command
-from pendmap.cli.parse.options import flag
+from pendmap.cli.parse.options import OUTPUT, flag, new_command
 
 _DEPENDENCIES = "numpy scipy xarray pandas netcdf4 matplotlib rerun-sdk click cloup tqdm"
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from pendmap.cli.parse.groups import argument, new_command
-from pendmap.cli.parse.options import output_options
+from pendmap.cli.parse.options import argument, new_command, output_options
 from pendmap.cli.parse.signature import options_of
-from pendmap.cli.show import Outputs, write_all
+from pendmap.cli.show import Outputs
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -28,8 +27,8 @@ def command(*, path: Path, rate_hz: float | None, **given: Any) -> None:  # noqa
     from pendmap.records import files_of, read_experiment
     from pendmap.records.summary import as_json, as_text
 
-    outputs = Outputs.take(given, "look", reads=files_of(path), default=False)
+    outputs = Outputs.take(given, "look", files_of(path), default=())
     with outputs.progress("read"):
         experiment = read_experiment(path, rate_hz=rate_hz)
-    written = write_all(outputs.files(experiment, None))
+    written = outputs.write(experiment)
     outputs.finish(written, lambda: as_json(experiment), [as_text(experiment)])

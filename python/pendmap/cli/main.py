@@ -32,22 +32,26 @@ INTERRUPTED = 130
 _FULL = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)
 """Error numbers of a full disk: the request itself was valid."""
 
-_COMMANDS = {
-    **{name: text for name, _, text in ANALYSES.values()},
-    "look": "Describe a record: channels, rate, noise, releases, faults.",
-    "identify": "Find natural frequency, damping and friction in a free decay.",
-    "compare": "Compare a model with records that it was not fitted to.",
-    "diagnose": "Find where model and records disagree, and which effect is missing.",
-    "effects": "Show the library of effects: formula, parameters, which data reveal each.",
-    "rig": "Write an experiment of a virtual rig, with its true parameters.",
-    "paper": "Draw a figure of the paper, by its number.",
-    "plot": "Draw a result again, without computing.",
-    "view": "Open a recording in the Rerun viewer.",
-    "info": "Show the version, the instruction set used, the threads.",
+_ANALYSES = {name: text for name, _, text in ANALYSES.values()}
+_SECTIONS = {
+    "Maps and motions": _ANALYSES,
+    "Records": {
+        "look": "Describe a record: channels, rate, noise, releases, faults.",
+        "identify": "Find natural frequency, damping and friction in a free decay.",
+        "compare": "Compare a model with records that it was not fitted to.",
+        "diagnose": "Find where model and records disagree, and which effect is missing.",
+        "effects": "Show the library of effects: formula, parameters, which data reveal each.",
+        "rig": "Write an experiment of a virtual rig, with its true parameters.",
+    },
+    "Other": {
+        "paper": "Draw a figure of the paper, by its number.",
+        "plot": "Draw a result again, without computing.",
+        "view": "Open a recording in the Rerun viewer.",
+        "info": "Show the version, the instruction set used, the threads.",
+    },
 }
-"""Commands and their descriptions, in the order of --help."""
-_SECTIONS = {"Maps and motions": "melnikov", "Records": "rig", "Other": "info"}
-"""Sections of --help, and the last command of each."""
+"""Sections of --help: commands and their descriptions."""
+_COMMANDS = [name for commands in _SECTIONS.values() for name in commands]
 _NAMED = re.compile(
     r"(?P<name>\w+) (?:is (?=[^:]+: )|(?=must (?:be|have|hold) ))(?P<rest>.*)", re.DOTALL
 )
@@ -62,7 +66,7 @@ class _Commands(click.Group):
     """Group whose commands are imported only when called: ``--help`` imports none of them."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
-        return list(_COMMANDS)
+        return _COMMANDS
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in _COMMANDS:
@@ -71,6 +75,10 @@ class _Commands(click.Group):
             near = difflib.get_close_matches(cmd_name, _COMMANDS, n=1)
             known = f"like {near[0]}" if near else "one of those that pendmap --help lists"
             raise click.UsageError(f"command must be {known}, got {cmd_name!r}")
+        if cmd_name in _ANALYSES:
+            from pendmap.cli.analysis import command_of
+
+            return command_of(cmd_name)
         module = importlib.import_module(f"pendmap.cli.{cmd_name}")
         loaded: click.Command = module.command
         return loaded
@@ -101,13 +109,9 @@ class _Commands(click.Group):
             raise click.UsageError(f"Invalid value for '{option}': {named['rest']}") from error
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
-        rows, names = list(_COMMANDS.items()), list(_COMMANDS)
-        first = 0
-        for title, last in _SECTIONS.items():
-            end = names.index(last) + 1
+        for title, commands in _SECTIONS.items():
             with formatter.section(title):
-                formatter.write_dl(rows[first:end], col_max=12)
-            first = end
+                formatter.write_dl([*commands.items()], col_max=12)
         with formatter.section("Examples"):
             for line in ("pendmap basins --p 1.7", "pendmap identify run.csv"):
                 formatter.write(f"  {line}\n")

@@ -8,23 +8,24 @@ from typing import TYPE_CHECKING
 
 import click
 
-from pendmap.cli.parse.groups import OUTPUT, argument, new_command
-from pendmap.cli.parse.options import option, overwrite_option, printed_options, simd_option
+from pendmap.cli.parse import options
+from pendmap.cli.parse.options import OUTPUT, argument, option
 from pendmap.cli.parse.signature import options_of
 from pendmap.cli.parse.types import FOLDER, PICTURES, default_file, output_file
-from pendmap.cli.show import free_name, keep_files, write_all
-from pendmap.cli.text import say, table, write_json
+from pendmap.cli.show import File, free_name, keep_files, say, table, write_all, write_json
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterator
 
 _LONG = "8"  # Figure that takes 100 s of a processor (AMD EPYC, family 26)
 
 
-@new_command("paper", "pendmap paper 2", "pendmap paper table1", "pendmap paper all --out figures")
+@options.new_command(
+    "paper", "pendmap paper 2", "pendmap paper table1", "pendmap paper all --out figures"
+)
 @argument("figure", "FIGURE", str, nargs=-1, required=True)
 @options_of("paper.figures.draw", "seed")
-@simd_option
+@options.simd_option
 @option(
     "--out",
     FOLDER,
@@ -37,8 +38,8 @@ _LONG = "8"  # Figure that takes 100 s of a processor (AMD EPYC, family 26)
     "File of one figure: .png .svg .pdf; for table1 a picture and a .csv.",
     group=OUTPUT,
 )
-@overwrite_option
-@printed_options()
+@options.overwrite_option
+@options.printed_options()
 def command(  # noqa: PLR0913 (an option each)
     *,
     figure: tuple[str, ...],
@@ -66,8 +67,9 @@ def command(  # noqa: PLR0913 (an option each)
         raise click.UsageError("--plot must have one figure, it is one file; --out takes a folder")
     if out is not None:
         out.mkdir(exist_ok=True)  # the parent folder must exist, as for every other file
-    folder = out or Path()
-    places = _places(keys, folder, plot, overwrite=overwrite)  # before anything is computed
+    if plot is not None and not overwrite:
+        keep_files([File("plot", plot, "--plot")])
+    places = {key: plot or _place(key, out or Path(), overwrite=overwrite) for key in keys}
     if _LONG in keys and not quiet:
         click.echo(f"Figure {_LONG} takes some minutes.", err=True)
     written = write_all(_files(places, seed))
@@ -84,23 +86,15 @@ def command(  # noqa: PLR0913 (an option each)
     written.check()
 
 
-def _places(
-    keys: Sequence[str], folder: Path, plot: Path | None, *, overwrite: bool
-) -> dict[str, Path]:
-    """Return the file of each figure; refuse those that cannot be written, or exist."""
-    if plot is not None:
-        if not overwrite:
-            keep_files({plot: "--plot"})
-        return dict.fromkeys(keys, plot)
-    places = {}
-    for key in keys:
-        name, suffix = ("table_1", ".csv") if key.startswith("table") else (f"figure_{key}", ".png")
-        name, _ = free_name(str(folder / name), [suffix], overwrite=overwrite)
-        places[key] = default_file(name + suffix)
-    return places
+def _place(key: str, folder: Path, *, overwrite: bool) -> Path:
+    """Return the file of a figure; refuse one that cannot be written, before any is computed."""
+    name, end = (f"figure_{key}", ".png") if key.isdigit() else ("table_1", ".csv")
+    free, _ = free_name(str(folder / name), [end], overwrite=overwrite)
+    return default_file(free + end)
 
 
 def _files(places: dict[str, Path], seed: int) -> Iterator[tuple[Callable[[Path], Path], Path]]:
+    """Yield writer and path of each figure; a picture of the table has a .csv beside it."""
     from pendmap.paper import figures
 
     for key, path in places.items():

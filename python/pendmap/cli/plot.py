@@ -8,11 +8,10 @@ from typing import Any
 
 import click
 
-from pendmap.cli.parse.groups import argument, group, new_command
-from pendmap.cli.parse.options import output_options
+from pendmap.cli.parse.options import argument, group, new_command, output_options
 from pendmap.cli.parse.signature import options_of, parameters
 from pendmap.cli.parse.types import RESULT, Address, OptionType
-from pendmap.cli.show import Outputs, write_all
+from pendmap.cli.show import Outputs
 from pendmap.errors import InputError, named
 
 
@@ -48,20 +47,18 @@ def command(*, file: Path | Address, **given: Any) -> None:  # noqa: ANN401 (out
     FILE is a result, .nc or .zarr, or the address of a .zarr. Figures and recordings are written;
     if none is named, FILE.png, for an address in this folder.
     """
-    names = ("layer", "size", "width", "dpi", "colormap", "title")
-    look = {name: given.pop(name) for name in names}
     at_address = isinstance(file, Address)
     if not PurePath(file).name:
         raise click.UsageError(f"{str(file)!r}: must be a result, .nc or .zarr, it is a folder")
     name = PurePath(file).stem if at_address else str(PurePath(file).with_suffix(""))
-    outputs = Outputs.take(given, name, reads=[] if at_address else [Path(file)], default=["plot"])
+    outputs = Outputs.take(given, name, [] if at_address else [Path(file)], default=("plot",))
 
     from pendmap.files.dataset import load
 
     result = load(file)
     with named(str(file)):
         try:
-            written = write_all(outputs.files(result, None, look=look))
+            written = outputs.write(result, **given)
         except (InputError, MemoryError):
             raise
         except Exception as error:

@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.cli.parse.groups import OUTPUT, argument, group, new_command
-from pendmap.cli.parse.options import flag, option, overwrite_option, printed_options
+from pendmap.cli.parse import options
+from pendmap.cli.parse.options import OUTPUT, argument, flag, group, option
 from pendmap.cli.parse.signature import options_of
 from pendmap.cli.parse.types import EFFECT, FOLDER, PICTURES, output_file
-from pendmap.cli.show import keep_files, write_all
-from pendmap.cli.text import say, write_json
+from pendmap.cli.show import File, keep_files, say, write_all, write_json
 from pendmap.formatting import counted
 
 if TYPE_CHECKING:
@@ -24,7 +23,7 @@ _REQUEST = "virtual_rig.experiment.Request"
 _HIDDEN = group("Hidden effects", "--effect quadratic_drag --seed 3")
 
 
-@new_command(
+@options.new_command(
     "rig",
     "pendmap rig free_decay --free 3 --out decay",
     "pendmap rig hidden --effect quadratic_drag --seed 3 --out hidden",
@@ -45,8 +44,8 @@ _HIDDEN = group("Hidden effects", "--effect quadratic_drag --seed 3")
 )
 @option("--out", FOLDER, "Folder to write.", group=OUTPUT)
 @option("--plot", output_file(*PICTURES), "Figure of the records: .png .svg .pdf.", group=OUTPUT)
-@overwrite_option
-@printed_options()
+@options.overwrite_option
+@options.printed_options()
 def command(  # noqa: PLR0913 (an option each)
     *,
     name: str | None,
@@ -75,7 +74,7 @@ def command(  # noqa: PLR0913 (an option each)
     request = virtual_rig.Request(name, **given)
     where = virtual_rig.places(out, replace=overwrite)
     if plot is not None and not overwrite:
-        keep_files({plot: "--plot"})
+        keep_files([File("plot", plot, "--plot")])
     experiment = virtual_rig.make(request)
     both = f"{where.experiment}, {where.truth}"
 
@@ -87,12 +86,11 @@ def command(  # noqa: PLR0913 (an option each)
     if plot is not None:
         files.append((functools.partial(_draw, where.experiment), plot))
     written = write_all(files)
-    whole = both in written
+    made = {"experiment": where.experiment, "truth": where.truth} if both in written else {}
     if as_json:
-        places = {"experiment": where.experiment, "truth": where.truth} if whole else {}
-        places |= {"plot": plot} if plot is not None and written.name(plot) else {}
-        write_json({name: str(path) for name, path in places.items()})
-    elif whole and not quiet:
+        made |= {"plot": plot} if plot is not None and written.name(plot) else {}
+        write_json({name: str(path) for name, path in made.items()})
+    elif made and not quiet:
         seconds = sum(run.plan.duration for run in experiment.runs)
         runs = counted(len(experiment.runs), "run")
         say(f"Written: {where.experiment} ({runs}, {seconds:.0f} s)")
@@ -111,6 +109,7 @@ def _draw(folder: Path, path: Path) -> Path:
 
 
 def _list(effects: list[dict[str, str]], *, as_json: bool) -> None:
+    """Print name, formula and parameters of each effect."""
     if as_json:
         write_json({"effects": effects})
         return

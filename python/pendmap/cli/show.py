@@ -1,4 +1,4 @@
-"""Outputs of commands: progress, files, JSON and text."""
+"""Outputs of commands: progress, files, and on stdout JSON or text of 80 columns."""
 
 from __future__ import annotations
 
@@ -8,81 +8,126 @@ import functools
 import importlib
 import importlib.util
 import itertools
+import re
 import shlex
 import sys
 import time
 from pathlib import Path, PurePath
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import click
 
 from pendmap.cli.parse.model_options import model_from
-from pendmap.cli.parse.options import RESULTS
 from pendmap.cli.parse.types import PICTURES, REPORTS, Address, default_file
-from pendmap.cli.text import say, write_json
-from pendmap.errors import InputError, NotWrittenError, named, one_line
+from pendmap.errors import InputError, NotWrittenError, escaped, named, one_line
 from pendmap.files import COMPLETE, check_room, held_interrupts
-from pendmap.formatting import duration
+from pendmap.formatting import columns, duration, json_text, wrapped
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 
     import xarray as xr
 
     from pendmap.analysis.result import Schema
+    from pendmap.formatting import Readable
     from pendmap.model import Pendulum, Rig
 
     Write = Callable[[Path], Path | str]
 
 
+_BOLD: Final = re.compile("(\x1b\\[[01]m)")  # What click.style writes
 _LONG: Final = 60.0  # Time left that is worth a line, s
 _SOON: Final = (3.0, 1e-4)  # Time, s, and share of the work from which on both tell the rest
-_LONGER: Final = 2.0  # Ratio of a new time to the one told that is worth another line
+_ENDS: Final = {"model": ".toml", "out": ".nc", "plot": ".png", "report": ".html", "rerun": ".rrd"}
+"""What a command may write, in this order, and the suffix of its default file."""
+_KINDS: Final = {
+    **dict.fromkeys(PICTURES, "plot"),
+    **dict.fromkeys(REPORTS, "report"),
+    ".rrd": "rerun",
+    ".toml": "model",
+}
+"""What a file of ``--out`` is, by its suffix; other files are the result itself."""
+_WRITERS: Final = {
+    "out": "files.dataset.save",
+    "plot": "render.draw",
+    "report": "render.write_report",
+    "rerun": "viewer.view",
+}
+"""Functions that write a result; they import matplotlib and Rerun, if needed."""
+
+
+def say(text: str, *, err: bool = False) -> None:
+    """Write lines to stdout or stderr; those of more than 80 columns go on below, indented.
+
+    Control characters, which names of files and columns may have, are escaped.
+    """
+    parts = enumerate(_BOLD.split(text))
+    safe = "".join(part if place % 2 else escaped(part) for place, part in parts)
+    click.echo(wrapped(safe), err=err)
+
+
+def write_json(fields: dict[str, Any]) -> None:
+    """Write one JSON object to stdout."""
+    click.echo(json_text(fields))
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a table with a bold header and aligned columns."""
+    parts = (part.partition("\n") for part in columns(head, rows).split("\n\n"))
+    return "\n\n".join(click.style(first, bold=True) + end + rest for first, end, rest in parts)
+
+
+def first_of_all(result: Readable, first: Collection[str]) -> Iterator[str]:
+    """Yield lines, then the tables and the other lines of a result's text."""
+    yield from first
+    tables, lines = result.text_parts()
+    yield from (table(head, rows) for head, rows in tables if rows)
+    yield from (line for line in lines if line not in first)
+
+
+def command_line() -> str:
+    """Return the command as it was typed."""
+    return "pendmap " + shlex.join(sys.argv[1:])
 
 
 def forecast(say: Callable[[str], object]) -> Callable[[int, int], None]:
-    """Return a callback of progress that says how long work of more than a minute takes.
+    """Return a callback of progress that says once how long work of more than a minute takes.
 
-    A part of a computation begins where the work done falls, or where its total changes. The time
-    is said again where a later part makes it much longer.
+    A part of a computation begins where the work done falls, or where its total changes.
     """
     began = since = time.monotonic()
-    last, first, most, longest = 0, 0, 0, 0.0
+    last = first = most = 0
+    announced = False
 
     def report(done: int, total: int) -> None:
-        nonlocal since, last, first, most, longest
+        nonlocal since, last, first, most, announced
         now = time.monotonic()
         if total != most or done < last:
             since, most, first = now, total, done
         last = done
-        if now - since < _SOON[0] or done - first < max(_SOON[1] * total, 1):
+        if announced or now - since < _SOON[0] or done - first < max(_SOON[1] * total, 1):
             return
         left = (now - since) * (total - done) / (done - first)
-        whole = now - began + left
-        if left > _LONG and whole > _LONGER * longest:
-            longest = whole
-            say(f"This takes about {duration(whole)}.")
+        announced = left > _LONG
+        if announced:
+            say(f"This takes about {duration(now - began + left)}.")
 
     return report
 
 
-_FIELDS: Final = {
-    **dict.fromkeys(PICTURES, "plot"),
-    **dict.fromkeys(REPORTS, "report"),
-    ".rrd": "rerun",
-}
-"""What a file of ``--out`` is, by its suffix; other files are the result itself."""
+class File(NamedTuple):
+    """A file to write."""
+
+    kind: str  # key of _ENDS
+    path: Path | Address
+    option: str = "--out"  # that names it
 
 
 @dataclasses.dataclass(frozen=True)
 class Outputs:
     """Output files and options of a command."""
 
-    out: Path | Address | None = None
-    whole: Path | None = None  # the whole result, where `out` is a model
-    plot: Path | None = None
-    report: Path | None = None
-    rerun: Path | None = None
+    files: tuple[File, ...]
     view: bool = False
     as_json: bool = False
     quiet: bool = False
@@ -94,77 +139,57 @@ class Outputs:
         cls,
         given: dict[str, Any],
         name: str,
-        suffix: str = RESULTS[0],
         reads: Iterable[Path | None] = (),
         *,
-        default: bool | Collection[str] = True,
+        default: Collection[str] = ("out", "plot", "rerun"),
+        always: Collection[str] = (),
         going_on: bool = False,
     ) -> Outputs:
-        """Remove the output options from ``given``; if none is given, by default all files.
+        """Remove the output options from ``given``; if none is given, the ``default`` is written.
 
-        Names of ``default`` choose among these. Without the viewer the recording is left out of
-        them. A file that exists is kept, unless --overwrite is given or a run in it goes on.
+        Without the viewer the recording is left out of it. A file that exists is kept, unless
+        --overwrite is given or a run in it goes on.
         """
-        overwrite, named_files = given.pop("overwrite"), given.pop("out")
-        fields = [field.name for field in dataclasses.fields(cls) if field.name in given]
-        taken: dict[str, Any] = {field: given.pop(field) for field in fields} | {"out": None}
-        options = {taken[f]: f"--{f}" for f in ("plot", "report", "rerun") if taken.get(f)}
-        known = _FIELDS if suffix in RESULTS else {**_FIELDS, RESULTS[0]: "whole"}
-        for path in named_files:
-            field = known.get(PurePath(path).suffix.lower(), "out")
-            if taken.get(field) is not None:
-                raise click.UsageError(
-                    f"one of {taken[field]} and {path} must be left out, got both"
-                )
-            taken[field] = path
-            options[path] = "--out"
-        files = {"out": suffix, "plot": ".png", "report": ".html", "rerun": ".rrd"}
-        wanted = {f: end for f, end in files.items() if f in {*fields, "out"}}
-        if not isinstance(default, bool):
-            wanted = {f: end for f, end in wanted.items() if f in default}
-        if not default or any(value for f, value in taken.items() if f != "quiet"):
-            wanted = {}
-            if taken.get("view") and taken["rerun"] is None:
-                wanted["rerun"] = ".rrd"
-            if "report" in taken and taken["out"] is None:  # a diagnosis always writes its model
-                wanted["out"] = suffix
+        named_files, overwrite = given.pop("out"), given.pop("overwrite")
+        switches = {key: given.pop(key, False) for key in ("view", "as_json", "quiet")}
+        options = {kind: given.pop(kind) for kind in _ENDS if kind in given}
+        files = [File(kind, path, f"--{kind}") for kind, path in options.items() if path]
+        files += [File(_KINDS.get(PurePath(p).suffix.lower(), "out"), p) for p in named_files]
+        left_out, wanted = "", list(default)
+        if files or switches["view"] or switches["as_json"]:
+            wanted = [*always, *(["rerun"] if switches["view"] else [])]
+            wanted = [kind for kind in wanted if kind not in {file.kind for file in files}]
         elif "rerun" in wanted and importlib.util.find_spec("rerun") is None:
-            taken["left_out"] = name + wanted.pop("rerun")
-        free, there = free_name(name, wanted.values(), overwrite=overwrite)
-        taken |= {f: default_file(free + end) for f, end in wanted.items()}
-        outputs = cls(**taken, kept=there)
-        keep_inputs(reads, outputs, options)
+            wanted.remove("rerun")
+            left_out = f"{name}.rrd"
+        free, there = free_name(name, [_ENDS[kind] for kind in wanted], overwrite=overwrite)
+        defaults = [File(kind, default_file(free + _ENDS[kind])) for kind in wanted]
+        every = sorted([*files, *defaults], key=lambda file: [*_ENDS].index(file.kind))
+        keep_inputs(reads, every)
         if not overwrite and not going_on:
-            keep_files(options)
-        if outputs.view:
+            keep_files(files)
+        if switches["view"]:
             from pendmap import viewer
 
             with named("--view"):
                 viewer.check_display()
-        return outputs
+        return cls(tuple(every), **switches, left_out=left_out, kept=there)
+
+    def path(self, kind: str) -> Path | Address | None:
+        """Return the first file of a kind."""
+        return next((file.path for file in self.files if file.kind == kind), None)
 
     def check_room(self, cells: int) -> None:
         """Refuse a map if the disk lacks half a byte a cell, the least compressed size."""
-        for path in (self.out, self.rerun):
-            if isinstance(path, Path):
+        for kind, path, _ in self.files:
+            if kind != "plot" and isinstance(path, Path):
                 check_room(path, cells // 2)
-
-    @property
-    def draws(self) -> bool:
-        """Whether a file, a figure or a recording is written."""
-        return bool(self.out or self.plot or self.rerun or self.view)
 
     @property
     def store(self) -> Path | Address | None:
         """The Zarr store that --out names."""
-        out = self.out
-        zarr = isinstance(out, Address) or (out is not None and out.suffix.lower() == ".zarr")
-        return out if zarr else None
-
-    @property
-    def shows_progress(self) -> bool:
-        """Whether stderr is a terminal and --quiet is not given."""
-        return sys.stderr.isatty() and not self.quiet
+        results = (file.path for file in self.files if file.kind == "out")
+        return next((p for p in results if str(p).lower().rstrip("/").endswith(".zarr")), None)
 
     @contextlib.contextmanager
     def progress(self, name: str) -> Iterator[Callable[[int, int], None] | None]:
@@ -189,31 +214,29 @@ class Outputs:
 
             yield report
 
-    def files(
+    def write(
         self,
         result: Any,  # noqa: ANN401 (a dataset, or what was found in records)
-        save: Write | None,
-        look: Mapping[str, Any] | None = None,
-    ) -> Iterator[tuple[Write, Path]]:
-        """Yield writer and path of each file; import matplotlib and Rerun only when needed.
+        model: Write | None = None,
+        *,
+        stored: Path | Address | None = None,
+        keep: bool = False,
+        **look: Any,  # noqa: ANN401 (arguments of the figure)
+    ) -> Written:
+        """Write all files but that in which the result is ``stored``; ``model`` writes a model."""
 
-        ``look`` has arguments of the figure.
-        """
-        if isinstance(self.out, Path) and save is not None:
-            yield save, self.out
-        if self.whole is not None:
-            from pendmap.files import dataset
+        def writers() -> Iterator[tuple[Write, Path]]:
+            for kind, path, _ in self.files:
+                if isinstance(path, Address) or path == stored:
+                    continue
+                if model is not None and kind == "model":
+                    yield model, path
+                    continue
+                module, _, function = _WRITERS[kind].rpartition(".")
+                write = getattr(importlib.import_module(f"pendmap.{module}"), function)
+                yield functools.partial(write, result, **(look if kind == "plot" else {})), path
 
-            yield functools.partial(dataset.save, result), self.whole
-        for path, module, write in (
-            (self.plot, "render", "draw"),
-            (self.report, "render", "write_report"),
-            (self.rerun, "viewer", "view"),
-        ):
-            if path is not None:
-                home = importlib.import_module(f"pendmap.{module}")
-                more = look or {} if write == "draw" else {}
-                yield functools.partial(getattr(home, write), result, **more), path
+        return write_all(writers(), keep=keep)
 
     def finish(
         self, written: Written, fields: Callable[[], dict[str, Any]], lines: Iterable[str]
@@ -230,17 +253,11 @@ class Outputs:
             if written and self.left_out:
                 say(f"Left out: {self.left_out}, which needs the extra pendmap[viewer]")
         written.check()
-        recording = written.name(self.rerun) if self.view else None
+        recording = written.name(self.path("rerun")) if self.view else None
         if recording is not None:
             from pendmap import viewer
 
             viewer.open_viewer(recording)
-
-
-def _report_files(report: Path) -> list[Path]:
-    """Return the files of a report without its figures; a folder holds one of either kind."""
-    in_folder = report.is_dir() or not report.suffix
-    return [report / "report.html", report / "report.md"] if in_folder else [report]
 
 
 def begin(
@@ -263,44 +280,35 @@ def free_name(
     return next(n for n in numbered if not any(Path(n + e).exists() for e in suffixes)), there
 
 
-def keep_files(options: Mapping[Path | Address, str]) -> None:
-    """Refuse files and stores that exist, named by their option."""
-    for path, option in options.items():
+def keep_files(files: Iterable[File]) -> None:
+    """Refuse files and stores that exist."""
+    for _, path, option in files:
         if isinstance(path, Address):
             from pendmap.files.dataset import reached, sealed
 
             with reached(path):
-                there = [str(path)] if sealed(path) else []
+                exists = bool(sealed(path))
         else:
-            files = _report_files(path) if option == "--report" else [path]
-            there = [str(file) for file in files if file.exists()]
-        for name in there:
+            exists = path.exists()
+        if exists:
             raise click.UsageError(
-                f"Invalid value for '{option}': {name!r}: must be a new file, got one that exists:"
-                " --overwrite replaces it"
+                f"Invalid value for '{option}': {str(path)!r}: must be a new file, got one that"
+                " exists: --overwrite replaces it"
             )
 
 
-def keep_inputs(
-    inputs: Iterable[Path | None], outputs: Outputs, options: Mapping[Path | Address, str]
-) -> None:
-    """Refuse outputs, named by their option, that are inputs or folders of inputs."""
-
-    def lost(path: Path, output: Path) -> bool:
-        places = [path, *path.resolve().parents] if output.is_dir() else [path]
-        return any(output.samefile(place) for place in places)
-
+def keep_inputs(inputs: Iterable[Path | None], files: Iterable[File]) -> None:
+    """Refuse outputs that are inputs, or folders of inputs."""
     read = [path for path in inputs if path is not None and path.exists()]
-    for named_file in (outputs.out, outputs.whole, outputs.plot, outputs.rerun, outputs.report):
-        if not isinstance(named_file, Path):
+    for _, output, option in files:
+        if isinstance(output, Address) or not output.exists():
             continue
-        files = _report_files(named_file) if named_file is outputs.report else [named_file]
-        for output in files:
-            if output.exists() and any(lost(path, output) for path in read):
-                raise click.UsageError(
-                    f"Invalid value for '{options.get(named_file, '--out')}': {str(output)!r}: is"
-                    " an input, which would be lost: it must be another file"
-                )
+        folders = [folder for path in read for folder in path.resolve().parents]
+        if any(output.samefile(p) for p in (folders if output.is_dir() else read)):
+            raise click.UsageError(
+                f"Invalid value for '{option}': {str(output)!r}: is an input, which"
+                " would be lost: it must be another file"
+            )
 
 
 @contextlib.contextmanager
@@ -308,18 +316,19 @@ def made_here() -> Iterator[None]:
     """Let the ``history`` of results name this command."""
     from pendmap.files.dataset import made_by
 
-    with made_by("pendmap " + shlex.join(sys.argv[1:])):
+    with made_by(command_line()):
         yield
 
 
-def show(dataset: xr.Dataset, outputs: Outputs, schema: Schema, stored: Sequence[str] = ()) -> None:
-    """Write the files asked for, then JSON or the summary to stdout; ``stored`` names stores."""
-    from pendmap.files.dataset import save
-
-    COMPLETE.extend(stored)
+def show(
+    dataset: xr.Dataset, outputs: Outputs, schema: Schema, stored: Path | Address | None = None
+) -> None:
+    """Write the files asked for, then JSON or the summary to stdout; ``stored`` is its store."""
+    complete = [] if stored is None else [str(stored)]
+    COMPLETE.extend(complete)
     with made_here():
-        written = write_all(outputs.files(dataset, functools.partial(save, dataset)))
-    written[:0] = stored
+        written = outputs.write(dataset, stored=stored)
+    written[:0] = complete
     lines = (dataset.attrs[name] for name in ("title", "summary"))
     outputs.finish(written, lambda: schema.json(dataset), lines)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from pendmap.cli.parse.groups import argument, new_command
+from pendmap.cli.parse.options import argument, new_command
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -1,8 +1,8 @@
 """Validation of a model on records it was not fitted to: decays, forced runs, forecasts, peaks.
 
 ``free`` and ``forced`` compare a model file with a run, ``experiment`` with all runs. ``data``
-divides records into those fitted and those held out; ``replay`` integrates a fitted model from a
-state; ``forecast`` computes its errors against the horizon, and those of periods and peaks.
+divides records into those fitted and those held out; ``forecast`` computes the errors of two fitted
+models on both, against the horizon, and those of periods and peaks.
 """
 
 from pendmap.comparison.experiment import Comparison, compare

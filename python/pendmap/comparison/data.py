@@ -18,33 +18,22 @@ if TYPE_CHECKING:
     from pendmap.records import Experiment, Run
     from pendmap.signal import Floats
 
-
 HELD: Final = ((0.25, 0.35), (0.65, 0.75))
 """Fractions of a run held out if no whole run is: a fifth in all, at large and small swings."""
-
 FEWEST_FORCED: Final = 2  # Fewest forced runs for which one whole run is held out
-
 FEWEST_FREE: Final = 3  # Fewest free runs for which one whole run is held out
-
 FEWEST: Final = 20  # Fewest samples of a held-out stretch
-
 LEAST: Final = round(FEWEST / (HELD[0][1] - HELD[0][0])) + 1
 """Fewest samples of a run from which stretches can be held out."""
-
 KNOWN: Final = 0.1
 """Relative standard error of the noise above which a record is too short to estimate it."""
-
 FINEST: Final = 1e-7
 """Lower bound on the noise, rad, below that of any sensor; covers errors of local polynomials."""
-
 BLOCKS: Final = 50
 """Fewest blocks in a swing or turn, so that noise and motion are separate in the spectrum."""
-
 FEWEST_BLOCKS: Final = 1000
 """Fewest blocks of a record; with fewer readings the integrator's own steps dominate the cost."""
-
 LEAST_OF_BLOCK: Final = 3  # Fewest readings of a block
-
 NEIGHBOURS: Final = 2  # Blocks on either side to which a parabola is fitted
 
 
@@ -173,27 +162,17 @@ def _hold_stretches(
     inside = not all(run.forced for run in every)
     fitted, held, held_of = [], [], []
     for k, run in enumerate(every):
-        if inside and run.forced:
-            fitted.append(run)
-            continue
-        good = run.counted
-        # Fractions of the included samples, not of the time at rest after them.
-        samples = np.flatnonzero(good)
-        back = np.zeros(good.shape, bool)
-        for first, last in held_parts(samples.size):
-            a, b = int(samples[first]), int(samples[last])
-            if b - a < FEWEST:
-                continue
-            back[a:b] = good[a:b]
+        back = np.zeros(run.time.shape, bool)
+        for a, b in [] if inside and run.forced else _stretches(run):
+            back[a:b] = run.counted[a:b]
             if not inside:
-                time, theta = run.time[a:b], run.theta[a:b]
+                time, theta, sigma = run.time[a:b], run.theta[a:b], run.sigmas[a:b]
+                good = run.counted[a:b]
                 held.append(
-                    dataclasses.replace(
-                        run, time=time, theta=theta, sigma=run.sigmas[a:b], trusted=good[a:b]
-                    )
+                    dataclasses.replace(run, time=time, theta=theta, sigma=sigma, trusted=good)
                 )
                 held_of.append(k)
-        fitted.append(dataclasses.replace(run, trusted=good & ~back))
+        fitted.append(dataclasses.replace(run, trusted=run.counted & ~back))
         if inside and back.any():
             held.append(dataclasses.replace(run, trusted=back))
             held_of.append(k)
@@ -206,9 +185,11 @@ def _hold_stretches(
     return DataSplit(experiment, runs, readings, tuple(fitted), tuple(held), *of, inside=inside)
 
 
-def held_parts(samples: int) -> list[tuple[int, int]]:
-    """Return start and end (exclusive) of each held-out stretch of samples."""
-    return [(int(low * (samples - 1)), int(high * (samples - 1))) for low, high in HELD]
+def _stretches(run: FitRun) -> list[tuple[int, int]]:
+    """Return the stretches held out of a run: fractions of its included samples."""
+    samples = np.flatnonzero(run.counted)
+    ends = [samples[[int(f * (samples.size - 1)) for f in part]].tolist() for part in HELD]
+    return [(a, b) for a, b in ends if b - a >= FEWEST]
 
 
 def average_blocks(run: FitRun) -> FitRun:

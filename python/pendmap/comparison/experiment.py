@@ -9,37 +9,59 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final
 import numpy as np
 import pandas as pd
 
+from pendmap import errors
 from pendmap.analysis.run import part
 from pendmap.comparison.forced import FEWEST, Ensemble, ForcedComparison, compare_forced
-from pendmap.comparison.free import ARRAYS, COLUMNS, MODEL, RunComparison, compare_free
-from pendmap.errors import (
-    MOST_THREADS,
-    FitDiverged,
-    InputError,
-    check_callable,
-    check_type,
-    check_whole,
-)
+from pendmap.comparison.free import MODEL, RunComparison, compare_free
+from pendmap.errors import FitDiverged, InputError
 from pendmap.files.saved import Saved
 from pendmap.formatting import counted, percent
+from pendmap.identification import results
 from pendmap.model import Rig
-from pendmap.records import experiment_of
-from pendmap.records.summary import doubt_lines, doubts, finding_lines
+from pendmap.records import experiment_of, summary
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from pendmap.comparison.forced import Statistic
-    from pendmap.comparison.steady import Cycle, Steady
+    from pendmap.comparison.itinerary import Cycle, Steady
+    from pendmap.files.saved import About
     from pendmap.formatting import Table
     from pendmap.records import Experiment, Run
     from pendmap.records.read import Records
-    from pendmap.signal import Floats
 
 
 _UNITS: Final = {"period": "s", "peak": "rad"}
 FITS: Final = 1.1
 """Rms residual over noise up to which a model fits; the noise is known to a few percent."""
+ARRAYS: Final[dict[str, About]] = results.ARRAYS | {
+    "RunComparison.curve": results.OF_MODEL,
+    "RunComparison.residual": ("reading", "rad", "reading less model; 0 if excluded"),
+    "ForcedComparison.time": ("instant", "s", "equal times of a forced run"),
+    "ForcedComparison.measured": ("instant", "rad", "record at these times"),
+    "ForcedComparison.velocity": ("instant", "rad/s", "velocity of the record"),
+    "ForcedComparison.example": {
+        "theta": ("instant", "rad", "reading of a member of the ensemble"),
+        "velocity": ("instant", "rad/s", "its velocity"),
+    },
+    "Statistic.ensemble": ("member", "1", "statistic of a member, in its unit"),
+    "Cycle.time": ("phase", "s", "time from a whole number of periods of the drive"),
+    "Cycle.theta": ("phase", "rad", "angle in a cycle, not wrapped"),
+    "Cycle.velocity": ("phase", "rad/s", "velocity in a cycle"),
+}
+"""Dimension, unit and meaning of the arrays of a comparison, by class and field."""
+COLUMNS: Final = {
+    "run": "name of a run",
+    "quantity": "what is compared",
+    "record": "value of the record",
+    "model": "value of the model; of an ensemble the median",
+    "low": "lower end of 95 % of the ensemble",
+    "high": "upper end of 95 % of the ensemble",
+    "chance": "p-value of the record in the ensemble",
+    "error_percent": "absolute error of the model, percent",
+    "unit": "unit of a value; empty for a pure number",
+}
+"""Meaning of the columns of its table."""
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -92,28 +114,17 @@ class Comparison(Saved):
             record), ``error_percent`` (absolute), nan where there is none, and ``unit``. The
             quantity ``residual`` has the noise of the record and the rms of the model.
         """
-        rows: list[tuple[Any, ...]] = []
-        for one in self.every:
-            name = one.run.name
-            rows.append((name, "residual", one.sigma, one.rms, *[math.nan] * 4, "rad"))
-            if isinstance(one, RunComparison):
-                for r in one.table.rows:
-                    quantity, error = f"{r.what} {r.measured:g}", r.errors.get(MODEL, math.nan)
-                    unit = _UNITS[r.what]
-                    rows.append((name, quantity, r.measured, *[math.nan] * 4, error, unit))
-            else:
-                rows += [
-                    (name, e.name, e.measured, e.median, *e.ci95, e.chance, math.nan, e.unit)
-                    for e in one.statistics
-                ]
-        columns = ["run", "quantity", "record", "model", "low", "high", "chance", "error_percent"]
-        table = pd.DataFrame(rows, columns=[*columns, "unit"])
-        return table.astype({"unit": "string"}).set_index(columns[:2])
+        rows = [
+            {"run": one.run.name, "unit": ""} | row
+            for one in self.every
+            for row in _quantities(one)
+        ]
+        table = pd.DataFrame(rows, columns=[*COLUMNS]).set_index(["run", "quantity"])
+        return table.astype({name: "string" if name == "unit" else float for name in table})
 
     def text_parts(self) -> tuple[list[Table], list[str]]:
-        """Return the tables and the lines that ``pendmap compare`` prints."""
-        tables = [_free_table(self.runs), _forced_table(self.forced)]
-        return [table for table in tables if table[1]], list(_lines(self))
+        """Return the table and the lines that ``pendmap compare`` prints."""
+        return [_table(self)], list(_lines(self))
 
 
 def compare(  # noqa: PLR0913 (each is asked for by name)
@@ -178,13 +189,13 @@ def compare(  # noqa: PLR0913 (each is asked for by name)
     >>> round(pendmap.compare(rig, run).runs[0].rms, 4)
     0.001
     """
-    check_type("model", model, Rig, "pendmap.load_model('model.toml') in SI")
+    errors.check_type("model", model, Rig, "pendmap.load_model('model.toml') in SI")
     experiment = experiment_of(records, rate_hz=rate_hz)
-    if ensemble is not None:
-        check_type("ensemble", ensemble, Ensemble, "pendmap.Ensemble(members=400)")
+    ensemble = Ensemble() if ensemble is None else ensemble
+    errors.check_type("ensemble", ensemble, Ensemble, "pendmap.Ensemble(members=400)")
     if threads is not None:
-        check_whole("threads", threads, 1, MOST_THREADS)
-    check_callable("progress", progress)
+        errors.check_whole("threads", threads, 1, errors.MOST_THREADS)
+    errors.check_callable("progress", progress)
     sampled = [run for run in experiment.runs if not run.peaks_only]
     if not sampled:
         raise InputError(f"{experiment.path}: one run or more must have samples, none has")
@@ -198,16 +209,9 @@ def compare(  # noqa: PLR0913 (each is asked for by name)
             _check_comparable(model, run)
             if run.kind == "free":
                 free.append(compare_free(model, run))
-            else:
-                forced.append(
-                    compare_forced(
-                        model,
-                        run,
-                        ensemble or Ensemble(),
-                        threads=threads,
-                        progress=part(progress, driven.index(run.name), len(driven)),
-                    )
-                )
+                continue
+            shown = part(progress, driven.index(run.name), len(driven))
+            forced.append(compare_forced(model, run, ensemble, threads=threads, progress=shown))
         except (FitDiverged, InputError) as error:  # the other runs are still compared
             out.append((run.name, str(error)))
     if not free and not forced:
@@ -237,9 +241,10 @@ def _check_comparable(model: Rig, run: Run) -> None:
 
 def as_json(comparison: Comparison) -> dict[str, Any]:
     """Return the JSON object of ``pendmap compare``; a time beyond a record's end is infinite."""
+    experiment, every = comparison.experiment, comparison.every
     return {
-        "experiment": str(comparison.experiment.path),
-        "doubts": doubts(comparison.experiment, *(one.run for one in comparison.every)),
+        "experiment": str(experiment.path),
+        "doubts": summary.doubts(experiment, *(one.run for one in every)),
         "runs": [
             {
                 "name": one.run.name,
@@ -248,67 +253,39 @@ def as_json(comparison: Comparison) -> dict[str, Any]:
                 "samples": int(one.run.trusted.sum()),
                 "noise": one.sigma,
                 "rms": one.rms,
-                **(_forced(one) if isinstance(one, ForcedComparison) else _free(one)),
+                "start": dict(zip(("theta", "velocity"), one.start, strict=True)),
+                "quantities": [*_quantities(one)],
+                **(_free(one) if isinstance(one, RunComparison) else _forced(one)),
                 "findings": [finding.text for finding in one.run.findings],
             }
-            for one in comparison.every
+            for one in every
         ],
         "left_out": [{"name": name, "why": why} for name, why in comparison.left_out],
-        "findings": [finding.text for finding in comparison.experiment.findings],
+        "findings": [finding.text for finding in experiment.findings],
     }
 
 
 def _free(one: RunComparison) -> dict[str, Any]:
-    errors = one.errors
+    """Return the JSON fields of a free decay."""
     return {
-        "start": {"theta": one.start[0], "velocity": one.start[1]},
-        "period_rms_percent": None if errors is None else errors.period_rms,
-        "peak_rms_percent": None if errors is None else errors.peak_rms,
-        "table1": [
-            {
-                "what": row.what,
-                "asked": row.asked,
-                "measured": row.measured,
-                "error_percent": row.errors.get(MODEL),
-            }
-            for row in one.table.rows
-        ],
-        "table1_left_out": one.table.left_out or next(iter(one.table.lost.values()), None),
-        "periods": [] if errors is None else _pairs(errors.period_time, errors.period_error),
-        "peaks": [] if errors is None else _pairs(errors.peak, errors.peak_error),
+        "period_rms_percent": one.errors and one.errors.period_rms,
+        "peak_rms_percent": one.errors and one.errors.peak_rms,
+        "table1_left_out": one.left_out or None,
     }
 
 
-def _pairs(places: Floats, errors: Floats) -> list[dict[str, float]]:
-    pairs = zip(places.tolist(), errors.tolist(), strict=True)
-    return [{"at": at, "error_percent": error} for at, error in pairs]
-
-
 def _forced(one: ForcedComparison) -> dict[str, Any]:
-    start, drive = one.start, one.run.drive
+    """Return the JSON fields of a forced run."""
+    drive, phase = one.run.drive, one.phase
     return {
         "windows": one.windows,
-        "start": {"theta": start.theta, "velocity": start.velocity},
-        "start_stderr": dict(zip(("theta", "velocity"), start.stderr, strict=True)),
-        "drive": None if drive is None else dict(drive),
-        "phi": None
-        if one.phase is None
-        else {"value": one.phase.value, "stderr": one.phase.stderr},
+        "start_stderr": dict(zip(("theta", "velocity"), one.start_stderr, strict=True)),
+        "drive": drive and dict(drive),
+        "phi": phase and {"value": phase.value, "stderr": phase.stderr},
         "members": one.ensemble.members,
         "members_lost": one.lost,
         "spread": one.ensemble.spread,
-        "statistics": [
-            {
-                "what": statistic.name,
-                "unit": statistic.unit or "1",
-                "measured": statistic.measured,
-                "median": statistic.median,
-                "ci95": statistic.ci95,
-                "chance": statistic.chance,
-            }
-            for statistic in one.statistics
-        ],
-        "steady": None if one.steady is None else _steady(one.steady),
+        "steady": one.steady and _steady(one.steady),
     }
 
 
@@ -328,54 +305,46 @@ def _steady(steady: Steady) -> dict[str, Any]:
     }
 
 
-def _name(run: Run) -> str:
-    return run.name + (" (held out)" if run.hold_out else "")
-
-
-def _free_table(runs: Sequence[RunComparison]) -> Table:
-    """Return header and rows of the table of free decays."""
-    head = ["run", "rms (rad)", "noise (rad)", "rms / noise", "periods, rms", "peaks, rms"]
-    rows = []
-    for one in runs:
-        errors = one.errors
-        rows.append(
-            [
-                _name(one.run),
-                f"{one.rms:.4g}",
-                f"{one.sigma:.3g}",
-                f"{one.rms / one.sigma:.3g}",
-                "" if errors is None else percent(errors.period_rms),
-                "" if errors is None else percent(errors.peak_rms),
-            ]
-        )
-    return head, rows
-
-
-def _forced_table(runs: Sequence[ForcedComparison]) -> Table:
-    """Return header and rows of the table of statistics of forced runs."""
-    head = ["forced run", "record", "model", "95 % of its ensemble", "p-value"]
-    rows = []
-    for one in runs:
-        rows.append([_name(one.run), "", "", "", ""])
-        for statistic in one.statistics:
-            low, high = statistic.ci95
-            rows.append(
-                [
-                    f"  {statistic.name}" + (f" ({statistic.unit})" if statistic.unit else ""),
-                    written(statistic, statistic.measured),
-                    written(statistic, statistic.median),
-                    f"{written(statistic, low)} to {written(statistic, high)}",
-                    f"{statistic.chance:.2g}",
-                ]
-            )
-    return head, rows
-
-
 def written(of: Statistic, value: float, digits: int = 4) -> str:
     """Return a value of a statistic as text."""
+    return "not yet" if not math.isfinite(value) else _number(value, digits, whole=not of.unit)
+
+
+def _number(value: float, digits: int = 4, *, whole: bool = False) -> str:
+    """Return a number as text: empty for NaN, ``not yet`` for an infinite time."""
     if not math.isfinite(value):
-        return "not yet"
-    return f"{value:.0f}" if not of.unit or abs(value) >= 10**digits else f"{value:.{digits}g}"
+        return "" if math.isnan(value) else "not yet"
+    return f"{value:.0f}" if whole or abs(value) >= 10**digits else f"{value:.{digits}g}"
+
+
+def _quantities(one: RunComparison | ForcedComparison) -> Iterator[dict[str, Any]]:
+    """Yield what of a run is compared, as rows of the table."""
+    yield {"quantity": "residual", "record": one.sigma, "model": one.rms, "unit": "rad"}
+    if isinstance(one, ForcedComparison):
+        for e in one.statistics:
+            row = {"quantity": e.name, "record": e.measured, "model": e.median, "unit": e.unit}
+            yield row | {"low": e.ci95[0], "high": e.ci95[1], "chance": e.chance}
+        return
+    if one.errors is not None:
+        yield {"quantity": "periods, rms", "error_percent": one.errors.period_rms}
+        yield {"quantity": "peaks, rms", "error_percent": one.errors.peak_rms}
+    for r in one.table.rows:
+        row = {"quantity": f"{r.what} {r.measured:.4g}", "record": r.measured}
+        yield row | {"error_percent": r.errors.get(MODEL), "unit": _UNITS[r.what]}
+
+
+def _table(comparison: Comparison) -> Table:
+    """Return the table of all runs as text; of periods and peaks it has the model's error."""
+    rows: list[list[str]] = []
+    table = comparison.to_dataframe()
+    for one in comparison.every:
+        rows.append([one.run.name + (" (held out)" if one.run.hold_out else ""), "", "", "", ""])
+        for row in table.loc[one.run.name].itertuples():
+            name = f"  {row.Index}" + (f" ({row.unit})" if row.unit else "")
+            model = percent(row.error_percent) or _number(row.model)
+            ends = "" if math.isnan(row.low) else f"{_number(row.low)} to {_number(row.high)}"
+            rows.append([name, _number(row.record), model, ends, _number(row.chance, 2)])
+    return ["run", "record", "model", "95 % of ensemble", "p-value"], rows
 
 
 def in_short(comparison: Comparison) -> list[str]:
@@ -385,65 +354,38 @@ def in_short(comparison: Comparison) -> list[str]:
     count = f"{len(every) - len(others)} of {counted(len(every), 'run')}"
     text = f"The model describes {count} (residual up to {FITS:g} times the noise)"
     text += f"; not {', '.join(others)}." if others else "."
-    return [*doubt_lines(comparison.experiment, *(one.run for one in every)), text]
+    return [*summary.doubt_lines(comparison.experiment, *(one.run for one in every)), text]
 
 
 def _lines(comparison: Comparison) -> Iterator[str]:
-    """Yield the lines printed with the tables: in short, table 1, quality of fit, findings."""
+    """Yield the lines printed with the table: in short, steady states, findings."""
     yield from in_short(comparison)
     for one in comparison.runs:
-        for row in one.table.rows:
-            unit = _UNITS[row.what]
-            error = row.errors.get(MODEL, math.nan)
-            text = "the model rests by then" if math.isnan(error) else f"error {percent(error)}"
-            yield f"{one.run.name}: {row.what} of {row.measured:.4g} {unit}: {text}"
-        if one.table.left_out:
-            yield f"{one.run.name}: {one.table.left_out}"
-        for reason in one.table.lost.values():
-            yield f"{one.run.name}: periods and peaks are not compared: {reason}"
+        if one.left_out:
+            yield f"{one.run.name}: {one.left_out}"
     for forced in comparison.forced:
-        yield from _forced_lines(forced)
+        name = forced.run.name
+        if forced.phase is not None:
+            yield f"{name}: the drive's phase is not given: {forced.phase.value:.4g} rad was fitted"
+        if forced.steady is not None:
+            yield f"{name}: {_steady_line(forced.steady)}"
+        if forced.lost:
+            yield f"{name}: {forced.lost} of {forced.ensemble.members} members overflowed"
     for name, why in comparison.left_out:
         yield f"{name}: not compared: {why}"
-    yield from finding_lines(comparison.experiment, *(one.run for one in comparison.every))
-
-
-def _forced_lines(one: ForcedComparison) -> Iterator[str]:
-    """Yield the lines on a run's residual, steady state and improbable statistics."""
-    name = one.run.name
-    yield (
-        f"{name}: in {counted(one.windows, 'window')} of up to three swings the residual is "
-        f"{one.rms:.3g} rad, {one.rms / one.sigma:.3g} times the noise"
-    )
-    if one.phase is not None:
-        yield f"{name}: the drive's phase is not given: {one.phase.value:.4g} rad was fitted"
-    if one.steady is not None:
-        yield f"{name}: {_steady_line(one.steady)}"
-    for statistic in one.unlike:
-        unit = f" {statistic.unit}" if statistic.unit and math.isfinite(statistic.measured) else ""
-        yield (
-            f"{name}: {statistic.name}: {written(statistic, statistic.measured)}{unit} is "
-            f"improbable under the model (p-value {statistic.chance:.2g})"
-        )
-    if one.lost:
-        yield f"{name}: {one.lost} of {one.ensemble.members} members overflowed"
+    yield from summary.finding_lines(comparison.experiment, *(one.run for one in comparison.every))
 
 
 def _steady_line(steady: Steady) -> str:
     """Return the text on the steady states of a record and of the model."""
-    ends = [
-        f"{one.cycle.name} from {percent(100 * one.share)} of the starts" for one in steady.reached
-    ]
+    ends = [f"{one.cycle.name} from {percent(100 * one.share)}" for one in steady.reached]
     share = sum(one.share for one in steady.reached)
     if share < 1 - 1e-9:
         ends.append(f"no cycle from {percent(100 * (1 - share))}")
-    head = f"settles on {steady.measured.name}; the model on {', '.join(ends)}"
+    head = f"settles on {steady.measured.name}; the model on {', '.join(ends)} of the starts"
     if steady.model is None:
         return f"{head}: not on the measured one"
-    more = ""
+    differ = f"{steady.rms:.2g} rad and {steady.rms_velocity:.2g} rad/s rms"
     if math.isfinite(steady.overestimate):
-        more = f", in amplitude by {100 * steady.overestimate:+.2g} %"
-    return (
-        f"{head}. Over a cycle they differ by {steady.rms:.2g} rad and {steady.rms_velocity:.2g} "
-        f"rad/s rms{more}"
-    )
+        differ += f", in amplitude by {100 * steady.overestimate:+.2g} %"
+    return f"{head}. Over a cycle they differ by {differ}"

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.comparison import steady
-from pendmap.comparison.itinerary import Itineraries, Ruler
+from pendmap.comparison.itinerary import UNITS, Ruler, reached_cycles, steady_state
 from pendmap.errors import (
     MOST_SEED,
     FitDiverged,
@@ -27,8 +26,9 @@ from pendmap.signal.robust import intervals_of
 from pendmap.units import Units
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
+    from pendmap.comparison.itinerary import Steady
     from pendmap.formatting import Estimate
     from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.runs import FitRun
@@ -36,22 +36,10 @@ if TYPE_CHECKING:
     from pendmap.records import Run
     from pendmap.signal import Floats, Mask
 
-    Simulated = Callable[[Floats, Floats], Floats]
-
 
 _AT_ONCE: Final = 4_000_000  # Samples held in memory at once
 _FOLLOWED: Final = 100  # Ensemble members that are integrated to their steady state
 FEWEST: Final = 32  # Fewest samples from which noise and initial state are estimated
-_UNLIKELY: Final = 0.01
-"""P-value below which a statistic is reported: for a true model, one of five in 5 % of runs."""
-_STATISTICS: Final = (
-    ("wells visited", "", "wells"),
-    ("escapes from a well", "", "escapes"),
-    ("angle covered", "rad", "covered"),
-    ("time to settle", "s", "settled"),
-    ("greatest velocity", "rad/s", "fastest"),
-)
-"""Name, unit and field of :class:`Itineraries` of each statistic."""
 _EXACTNESS: Final = 1e-9  # Error tolerance of the integrator per step
 _EVEN: Final = (2.5, 97.5)  # Percentiles of the central 95 % interval
 
@@ -85,46 +73,6 @@ class Ensemble:
         if not 0 <= check_number("spread", self.spread) <= 1:
             raise InputError(f"spread must be a number from 0 to 1 rad, got {self.spread:g}")
         check_whole("seed", self.seed, 0, MOST_SEED)
-
-
-@dataclasses.dataclass(frozen=True)
-class Start:
-    """Initial state of a run, estimated with a model from its first window."""
-
-    time: float  # s, on the run's clock
-    theta: float  # rad
-    velocity: float  # rad/s
-    covariance: Floats  # of angle and velocity, shape (2, 2)
-
-    @property
-    def stderr(self) -> tuple[float, float]:
-        """Standard errors of angle and velocity, rad and rad/s."""
-        return tuple(np.sqrt(np.diag(self.covariance)).tolist())
-
-    def drawn(self, count: int, spread: float, w0: float, seed: int) -> Floats:
-        """Return random initial states about this one, which is the first, shape (2, count).
-
-        Their distribution is normal, with this covariance plus ``spread^2`` in angle and ``(spread
-        w0)^2`` in velocity.
-        """
-        wide = self.covariance + np.diag([spread**2, (spread * w0) ** 2])
-        drawn = np.random.default_rng(seed).multivariate_normal(np.zeros(2), wide, count)
-        drawn[0] = 0.0
-        return np.array([[self.theta], [self.velocity]]) + drawn.T
-
-
-def start_of(fit: TrajectoryFit, run: FitRun) -> Start:
-    """Return the state at the beginning of a run's first window, with its covariance.
-
-    ``fit`` is of this run alone, with fitted initial states of its windows.
-    """
-    first = dataclasses.replace(fit, windows=fit.windows[:1], names=())
-    _, (window,) = window_slopes(first, [run], (), fit.model)
-    scale = np.array([1.0, fit.model.w0])
-    inverse = np.linalg.pinv(window.states.T @ window.states, hermitian=True)
-    covariance = np.asarray(inverse * np.outer(scale, scale), np.float64)
-    ((_, begin, _, theta, velocity),) = first.windows
-    return Start(float(run.time[begin]), theta, velocity, covariance)
 
 
 def simulated_readings(
@@ -193,8 +141,9 @@ class ForcedComparison:
         state, rad.
     windows : int
         Number of these windows.
-    start : Start
-        Initial state of the run.
+    start, start_stderr : (float, float)
+        Angle (rad) and velocity (rad/s) at the beginning, fitted to the first window, and their
+        standard errors.
     phase : Estimate or None
         Fitted phase of the drive, rad, if it was not stated.
     time, measured : ndarray, shape (N,)
@@ -217,7 +166,8 @@ class ForcedComparison:
     sigma: float
     rms: float
     windows: int
-    start: Start
+    start: tuple[float, float]
+    start_stderr: tuple[float, float]
     phase: Estimate | None
     time: Floats
     measured: Floats
@@ -225,7 +175,7 @@ class ForcedComparison:
     example: Floats
     lost: int
     statistics: tuple[Statistic, ...]
-    steady: steady.Steady | None
+    steady: Steady | None
     ensemble: Ensemble
 
     def __repr__(self) -> str:
@@ -235,11 +185,6 @@ class ForcedComparison:
             f"<ForcedComparison {self.run.name}{held}: rms {self.rms:.3g} rad in "
             f"{self.windows} windows, noise {self.sigma:.3g} rad; {ends}>"
         )
-
-    @property
-    def unlike(self) -> tuple[Statistic, ...]:
-        """Statistics with a p-value of less than 1 %."""
-        return tuple(one for one in self.statistics if one.chance < _UNLIKELY)
 
 
 def compare_forced(
@@ -262,36 +207,36 @@ def compare_forced(
     fit = fit_runs([given], model, free=(), profiled=())
     phase = next((e for name, e in fit.estimates.items() if name.startswith("phi")), None)
     given = dataclasses.replace(given, drive=fit.drive_of(given, 0))
-    start = start_of(fit, given)
-    time, measured = _evenly(run, given, start.time)
+    _, begin, _, *start = fit.windows[0]
+    covariance = _start_covariance(fit, given)
+    time, measured = _evenly(run, given, float(given.time[begin]))
     period = None if given.drive is None else math.tau / float(given.drive["Omega"] or math.nan)
     ruler = Ruler(time[1] - time[0], math.tau / model.w0, period, worth.sigma)
-    record = Itineraries.of(measured[None], ruler)
-    starts = start.drawn(ensemble.members, ensemble.spread, model.w0, ensemble.seed)
+    starts = drawn_starts(start, covariance, ensemble, model.w0)
     simulated = functools.partial(simulated_readings, given, model, threads=threads)
-    made, finite = _members(simulated, starts, time, ruler, progress)
-    if not finite.any():
+    members, finite = _members(simulated, starts, time, ruler, progress)
+    if not members:
         raise InputError(f"{run.name}: the model overflows from every start")
     starts = starts[:, finite]
     statistics = tuple(
-        Statistic(name, unit, float(getattr(record, key)[0]), getattr(made, key).astype(float))
-        for name, unit, key in _STATISTICS
-    )
-    place = _example(statistics)
-    reading = simulated(starts[:, [place]], time)[0]
-    cycles = None
-    if period is not None and record.n[0]:
-        closes, since = (int(record.n[0]), int(record.w[0])), time[0] + float(record.settled[0])
-        cycles = steady.compared(
-            steady.folded(time, measured, period, closes, since),
-            steady.reached(simulated, start.time, starts[:, :_FOLLOWED], period, model.c_over_m),
+        Statistic(
+            name, UNITS.get(name, ""), float(value), np.array([m[name] for m in members], float)
         )
+        for name, value in ruler.statistics(measured).items()
+    )
+    reading = simulated(starts[:, [_example(statistics)]], time)[0]
+    last, cycles = ruler.cycling(measured), None
+    if period is not None and last.n:
+        followed = starts[:, :_FOLLOWED]
+        ends = reached_cycles(simulated, time[0], followed, period, model.c_over_m)
+        cycles = steady_state(time, measured, period, last, ends)
     return ForcedComparison(
         run=run,
         sigma=worth.sigma,
         rms=fit.rms,
         windows=len(fit.windows),
-        start=start,
+        start=(float(start[0]), float(start[1])),
+        start_stderr=tuple(np.sqrt(np.diag(covariance)).tolist()),
         phase=phase,
         time=time,
         measured=measured,
@@ -302,6 +247,30 @@ def compare_forced(
         steady=cycles,
         ensemble=ensemble,
     )
+
+
+def _start_covariance(fit: TrajectoryFit, run: FitRun) -> Floats:
+    """Return the covariance of angle and velocity at the beginning of a run, the only one."""
+    first = dataclasses.replace(fit, windows=fit.windows[:1], names=())
+    _, (window,) = window_slopes(first, [run], (), fit.model)
+    scale = np.array([1.0, fit.model.w0])
+    inverse = np.linalg.pinv(window.states.T @ window.states, hermitian=True)
+    return np.asarray(inverse * np.outer(scale, scale), np.float64)
+
+
+def drawn_starts(
+    start: Sequence[float], covariance: Floats, ensemble: Ensemble, w0: float
+) -> Floats:
+    """Return random initial states about a measured one, which is the first, shape (2, M).
+
+    Their distribution is normal, with this covariance plus ``spread^2`` in angle and ``(spread
+    w0)^2`` in velocity.
+    """
+    wide = covariance + np.diag([ensemble.spread**2, (ensemble.spread * w0) ** 2])
+    draw = np.random.default_rng(ensemble.seed)
+    drawn = draw.multivariate_normal(np.zeros(2), wide, ensemble.members)
+    drawn[0] = 0.0
+    return np.array(start)[:, None] + drawn.T
 
 
 def _evenly(run: Run, given: FitRun, begin: float) -> tuple[Floats, Floats]:
@@ -316,31 +285,31 @@ def _evenly(run: Run, given: FitRun, begin: float) -> tuple[Floats, Floats]:
 
 
 def _members(
-    simulated: Simulated,
+    simulated: Callable[[Floats, Floats], Floats],
     starts: Floats,
     time: Floats,
     ruler: Ruler,
     progress: Callable[[int, int], object] | None,
-) -> tuple[Itineraries, Mask]:
-    """Return the itineraries of the members, and which members stayed finite."""
+) -> tuple[list[dict[str, float]], Mask]:
+    """Return the statistics of each member that stayed finite, and which did."""
     draw = np.random.default_rng(0)  # results are insensitive to the noise's seed
     count, many = starts.shape[1], max(1, _AT_ONCE // time.size)
-    parts, finite = [], np.zeros(count, dtype=bool)
+    members: list[dict[str, float]] = []
+    finite = np.zeros(count, dtype=bool)
     for first in range(0, count, many):
-        block = slice(first, first + many)
-        reading = simulated(starts[:, block], time)
-        finite[block] = np.isfinite(reading).all(axis=1)
-        noise = draw.normal(0.0, ruler.sigma, reading.shape)
-        parts.append(Itineraries.of((reading + noise)[finite[block]], ruler))
+        block = simulated(starts[:, first : first + many], time)
+        for k, reading in enumerate(block, first):
+            noise = draw.normal(0.0, ruler.sigma, time.size)
+            finite[k] = np.isfinite(reading).all()
+            if finite[k]:
+                members.append(ruler.statistics(reading + noise))
         if progress is not None:
             progress(min(first + many, count), count)
-    return Itineraries.joined(parts), finite
+    return members, finite
 
 
 def _example(statistics: tuple[Statistic, ...]) -> int:
     """Return the index of the member whose ranks are nearest to the medians of all statistics."""
-    ranks = []
-    for one in statistics:
-        order = np.argsort(np.argsort(one.ensemble, kind="stable"), kind="stable")
-        ranks.append(order / max(order.size - 1, 1) - 0.5)
+    order = [np.argsort(np.argsort(one.ensemble, kind="stable")) for one in statistics]
+    ranks = np.array(order) / max(len(order[0]) - 1, 1) - 0.5
     return int(np.argmin(np.abs(ranks).max(axis=0)))

@@ -7,6 +7,9 @@ the initial state.
 
 Periods and peaks: as in the paper's figure 7 a model is integrated from the first measured peak, at
 rest; nothing is fitted. Fitted damping may be negative there.
+
+A fitted model may diverge in another record, from another state or with another size of an effect.
+The part of a diagnosis that needs this motion is then omitted, and the reason is kept.
 """
 
 from __future__ import annotations
@@ -14,45 +17,102 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple, TypeVar
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
-from pendmap.comparison.replay import Reasons, compute_part
 from pendmap.identification.motion import Motion, fit_states, run_forward
 from pendmap.identification.peaks import find_peaks
 from pendmap.identification.runs import FitRun
 from pendmap.identification.table1 import errors_of
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from pendmap.comparison.data import DataSplit
-    from pendmap.comparison.replay import Fits
     from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.peaks import Peaks
     from pendmap.identification.table1 import PeakErrors
     from pendmap.signal import Floats, Indices, Mask
 
-
+Reasons = dict[str, str]  # Reason why a part was not computed, by its field in the JSON object
+Part = TypeVar("Part")
+LOST: Final = (ArithmeticError, np.linalg.LinAlgError)
+"""Errors raised by a diverging motion, directly or in arithmetic and linear algebra with it."""
+INSTANTS: Final = 150  # Instants of the records at which the torque of an effect is evaluated
+STEP: Final = 1e-3
+"""Integration time from each instant, in periods of small swings, short against the motion."""
+EXACT: Final = 1e-9
+"""Nominal standard error of readings, rad, which sets the integrator's tolerance."""
 REACH: Final = 2 / 3
 """Length of forecasts over the median stretch; starts are spread over the rest of a stretch."""
-
 STARTS: Final = 12  # Most starts in a stretch, at least half a swing apart
-
 BINS: Final = 40  # Most bins of the horizon, each at least a tenth of a swing
-
 FEWEST: Final = 8  # Fewest readings to which an initial state is fitted
-
 BEGIN: Final = 0.15  # Fraction of a swing over which a parabola gives the first guess of a state
-
 BEFORE: Final = "before"
 AFTER: Final = "after"  # Names of the baseline and of the better model
-
 PER_SWING: Final = 200
 """Samples of a swing between which cubics interpolate a peak, to 1e-7 of the swing."""
-
 FEWEST_PEAKS: Final = 3  # Fewest peaks of a compared run: one full cycle
+
+
+def compute_part(reasons: Reasons, field: str, compute: Callable[[], Part], default: Part) -> Part:
+    """Return a part of a diagnosis, or the default if it fails, with the reason in ``reasons``."""
+    try:
+        return compute()
+    except LOST as error:
+        reasons[field] = str(error)
+        return default
+
+
+class Fits(NamedTuple):
+    """Fit of a model to records, and the model with these parameters on the held-out records."""
+
+    fitted: TrajectoryFit
+    held: TrajectoryFit
+
+
+@dataclasses.dataclass(frozen=True)
+class Strength:
+    """Strength of an effect over the motion of the fitted records."""
+
+    torque: float  # Root mean square of its torque over the moment of inertia, rad/s^2
+    greatest_torque: float  # Greatest size of that torque, rad/s^2
+    reading: float  # Root mean square of its contribution to the reading, rad
+    greatest_reading: float  # Greatest size of that contribution, rad
+
+
+def effect_strength(fit: TrajectoryFit, fitted: Sequence[FitRun], effect: str) -> Strength:
+    """Return the strength of an effect from the motion with and without it; raises FitDiverged."""
+    step = STEP * 2 * np.pi / fit.model.w0
+    runs, states = [], []
+    count = -(-INSTANTS // len(fitted))
+    for k, run in enumerate(fitted):
+        theta, velocity = fit.curves[k]
+        known = np.flatnonzero(np.isfinite(theta))
+        drive = fit.drive_of(run, k)
+        for at in known[np.linspace(0, known.size - 1, min(count, known.size)).astype(int)]:
+            time = run.time[at] + step * np.array([0.0, 0.5, 1.0])  # a record has at least three
+            runs.append(
+                dataclasses.replace(
+                    run, time=time, theta=np.zeros(3), sigma=EXACT, trusted=None, drive=drive
+                )
+            )
+            states.append((float(theta[at]), float(velocity[at])))
+    motion = Motion.of(fit)
+    with_it = run_forward(motion, runs, states)
+    without = run_forward(motion.without(effect), runs, states)
+    pairs = list(zip(with_it, without, strict=True))
+    torque = np.array([(a[1, 2] - b[1, 2]) / step for (_, a), (_, b) in pairs])
+    reading = np.array([a[0] - b[0] for (a, _), (b, _) in pairs])
+    return Strength(
+        float(np.sqrt(np.mean(torque**2))),
+        float(np.abs(torque).max()),
+        float(np.sqrt(np.mean(reading**2))),
+        float(np.abs(reading).max()),
+    )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -67,8 +127,7 @@ class Forecast:
     starts: int  # Number of forecasts
 
 
-@dataclasses.dataclass(frozen=True)
-class _Stretch:
+class _Stretch(NamedTuple):
     """Stretch of consecutive held-out readings of a run."""
 
     run: FitRun
@@ -79,11 +138,11 @@ class _Stretch:
     latest: float  # Last time, s
 
 
-@dataclasses.dataclass(frozen=True)
-class _Launch:
+class _Launch(NamedTuple):
     """Start of a forecast in a stretch."""
 
-    stretch: _Stretch
+    run: FitRun
+    place: int  # As in the stretch
     behind: Mask  # Readings of the swing before, to which the state is fitted
     ahead: Mask  # Held-out readings up to the horizon
     bins: Indices  # Bin of the horizon of each reading ahead
@@ -131,28 +190,27 @@ def _forecast(
     launches = [one for s in stretches for one in _launches(s, reach, swing, count)]
     if not launches:
         return None
-    noise = [one.stretch.run.sigmas[one.ahead] for one in launches]
-    floors = [float(np.mean(sigmas**2)) if sigmas.size else math.nan for sigmas in noise]
+    floors = [one.run.sigmas[one.ahead] ** 2 for one in launches if one.ahead.any()]
+    floor = math.sqrt(float(np.mean([np.mean(squares) for squares in floors])))
     before, after = (_errors(model, launches, swing, count) for model in (base, best))
     middles = (np.arange(count) + 0.5) * reach / count
-    floor = math.sqrt(float(np.nanmean(floors)))
     return Forecast(kind, middles, before, after, floor, len(launches))
 
 
 def _launches(stretch: _Stretch, reach: float, swing: float, count: int) -> list[_Launch]:
     """Return the starts of forecasts in a stretch with enough readings before each."""
-    room = stretch.latest - reach - stretch.earliest
+    run, room = stretch.run, stretch.latest - reach - stretch.earliest
     if room < 0:
         return []
     starts = min(STARTS, 1 + int(room / (swing / 2)))
     launches = []
     for at in np.linspace(stretch.earliest, stretch.earliest + room, starts):
-        later = stretch.run.time - at
+        later = run.time - at
         behind = stretch.good & (later > -swing) & (later <= 0)
         ahead = stretch.held & (later > 0) & (later <= reach)
         bins = np.minimum((later[ahead] / reach * count).astype(np.intp), count - 1)
         if np.count_nonzero(behind) >= FEWEST:
-            launches.append(_Launch(stretch, behind, ahead, bins))
+            launches.append(_Launch(run, stretch.place, behind, ahead, bins))
     return launches
 
 
@@ -160,21 +218,19 @@ def _errors(model: Fits, launches: list[_Launch], swing: float, count: int) -> F
     """Return the root mean square error in each bin, rad."""
     before, whole = [], []
     for one in launches:
-        drive = model.held.drive_of(one.stretch.run, one.stretch.place)
-        run = dataclasses.replace(one.stretch.run, drive=drive)
+        drive = model.held.drive_of(one.run, one.place)
+        run = dataclasses.replace(one.run, drive=drive)
         before.append(_samples(run, one.behind))
         whole.append(_samples(run, one.behind | one.ahead))
     motion = Motion.of(model.fitted)
     states = fit_states(motion, before, [_guess(run, swing) for run in before])
-    forecasts = run_forward(motion, whole, states)
     squares, samples = np.zeros(count), np.zeros(count)
-    for one, (readings, _) in zip(launches, forecasts, strict=True):
-        error = one.stretch.run.theta[one.ahead] - readings[readings.size - one.bins.size :]
+    for one, (readings, _) in zip(launches, run_forward(motion, whole, states), strict=True):
+        error = one.run.theta[one.ahead] - readings[readings.size - one.bins.size :]
         error = np.angle(np.exp(1j * error))  # modulo a turn
         squares += np.bincount(one.bins, error**2, count)
         samples += np.bincount(one.bins, minlength=count)
-    with np.errstate(invalid="ignore"):
-        return np.sqrt(squares / np.where(samples > 0, samples, math.nan))
+    return np.asarray(np.sqrt(squares / np.where(samples > 0, samples, math.nan)))
 
 
 def _samples(run: FitRun, chosen: Mask) -> FitRun:
@@ -234,17 +290,24 @@ def noise_rms(runs: Sequence[FitRun]) -> float:
 
 def compute_gap(data: DataSplit, base: Fits, best: Fits) -> Gap:
     """Return the root mean square residuals of a baseline and of a model."""
-    rows: list[RunGap] = []
-    floors, rms = [], []
-    for held_out in (False, True):
-        runs = data.held if held_out else data.fitted
-        before, after = ((f.held if held_out else f.fitted) for f in (base, best))
+    rows = []
+    sides = (
+        (False, data.fitted, base.fitted, best.fitted),
+        (True, data.held, base.held, best.held),
+    )
+    for held_out, runs, before, after in sides:
         for run, *left in zip(runs, before.residuals, after.residuals, strict=True):
             rms_of = (_rms(run, residual) for residual in left)
             rows.append(RunGap(run.name, held_out, noise_rms([run]), *rms_of))
-        floors.append(noise_rms(runs))
-        rms += [before.rms, after.rms]
-    return Gap(floors[0], floors[1], rms[0], rms[1], rms[2], rms[3], tuple(rows))
+    return Gap(
+        noise_floor=noise_rms(data.fitted),
+        held_out_noise_floor=noise_rms(data.held),
+        before=base.fitted.rms,
+        after=best.fitted.rms,
+        held_out_before=base.held.rms,
+        held_out_after=best.held.rms,
+        by_run=tuple(rows),
+    )
 
 
 def _rms(run: FitRun, residual: Floats) -> float:
@@ -309,21 +372,9 @@ def _turning_points(time: Floats, readings: Floats, curve: Floats) -> tuple[Floa
     theta, velocity = curve
     before, after = velocity[1:-1], velocity[2:]
     turns = np.flatnonzero((before * after < 0) | ((before != 0) & (after == 0))) + 1
-    step, bottom = np.diff(time)[turns], theta[turns]
-    # Zeros of the derivative of Hermite's cubic through both ends.
-    rise = theta[turns + 1] - bottom
-    v, w = step * velocity[turns], step * velocity[turns + 1]
-    a, b = 3 * (v + w - 2 * rise), 2 * (3 * rise - 2 * v - w)
-    half = -0.5 * (b + np.copysign(np.sqrt(np.maximum(b * b - 4 * a * v, 0.0)), b))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        roots = np.stack([v / half, half / a])
-    # The velocity changes sign once between the samples: one root is inside.
-    inside = (roots >= 0) & (roots <= 1)
-    x = np.where(inside[0], roots[0], np.where(inside[1], roots[1], 1.0))
-    angle = bottom + x * (v + x * (b / 2 + x * a / 3))
-    errors = readings - theta
-    zero = errors[turns] + x * (errors[turns + 1] - errors[turns])
-    return (
-        np.concatenate([time[:1], time[turns] + x * step]),
-        np.concatenate([readings[:1], angle + zero]),
-    )
+    spline = CubicHermiteSpline(time, theta, velocity)
+    roots = spline.derivative().roots(extrapolate=False)
+    roots = np.append(roots[np.isfinite(roots)], time[-1])
+    at = roots[np.searchsorted(roots, time[turns])].clip(time[turns], time[turns + 1])
+    angle = spline(at) + np.interp(at, time, readings - theta)
+    return np.append(time[:1], at), np.append(readings[:1], angle)

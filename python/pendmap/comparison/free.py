@@ -6,7 +6,6 @@ import dataclasses
 from typing import TYPE_CHECKING, Final
 
 from pendmap.formatting import Estimate
-from pendmap.identification import results
 from pendmap.identification.fit import fit_runs
 from pendmap.identification.methods.base import Identification
 from pendmap.identification.parameters import OFFSET
@@ -16,7 +15,6 @@ from pendmap.identification.runs import rig_of
 from pendmap.identification.table1 import table_of_run
 
 if TYPE_CHECKING:
-    from pendmap.files.saved import About
     from pendmap.identification.peaks import Peaks
     from pendmap.identification.table1 import PeakErrors, Table1
     from pendmap.model import Rig
@@ -24,34 +22,6 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats
 
 MODEL: Final = "model"  # Name of the model in table 1
-ARRAYS: Final[dict[str, About]] = results.ARRAYS | {
-    "RunComparison.curve": results.OF_MODEL,
-    "RunComparison.residual": ("reading", "rad", "reading less model; 0 if excluded"),
-    "ForcedComparison.time": ("instant", "s", "equal times of a forced run"),
-    "ForcedComparison.measured": ("instant", "rad", "record at these times"),
-    "ForcedComparison.velocity": ("instant", "rad/s", "velocity of the record"),
-    "ForcedComparison.example": {
-        "theta": ("instant", "rad", "reading of a member of the ensemble"),
-        "velocity": ("instant", "rad/s", "its velocity"),
-    },
-    "Statistic.ensemble": ("member", "1", "statistic of a member, in its unit"),
-    "Cycle.time": ("phase", "s", "time from a whole number of periods of the drive"),
-    "Cycle.theta": ("phase", "rad", "angle in a cycle, not wrapped"),
-    "Cycle.velocity": ("phase", "rad/s", "velocity in a cycle"),
-}
-"""Dimension, unit and meaning of the arrays of a comparison, by class and field."""
-COLUMNS: Final = {
-    "run": "name of a run",
-    "quantity": "what is compared",
-    "record": "value of the record",
-    "model": "value of the model; of an ensemble the median",
-    "low": "lower end of 95 % of the ensemble",
-    "high": "upper end of 95 % of the ensemble",
-    "chance": "p-value of the record in the ensemble",
-    "error_percent": "absolute error of the model, percent",
-    "unit": "unit of a value; empty for a pure number",
-}
-"""Meaning of the columns of its table."""
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -98,6 +68,12 @@ class RunComparison:
     def errors(self) -> PeakErrors | None:
         """Errors of periods and peaks; None if there are too few."""
         return self.table.errors.get(MODEL)
+
+    @property
+    def left_out(self) -> str:
+        """Reason why a record with peaks has no such errors, or empty."""
+        lost = self.table.lost.get(MODEL)
+        return f"periods and peaks are not compared: {lost}" if lost else self.table.left_out
 
 
 def compare_free(model: Rig, run: Run) -> RunComparison:

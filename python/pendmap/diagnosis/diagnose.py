@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from pendmap.analysis.run import in_rounds
 from pendmap.comparison.data import split_records
-from pendmap.comparison.forecast import compute_gap
-from pendmap.comparison.replay import Reasons, compute_part
+from pendmap.comparison.forecast import Reasons, compute_gap, compute_part
 from pendmap.diagnosis.baseline import fit_baseline
 from pendmap.diagnosis.candidates import checked_own
 from pendmap.diagnosis.fitted_model import settles

@@ -6,7 +6,7 @@ import dataclasses
 import math
 from typing import TYPE_CHECKING
 
-from pendmap.comparison.replay import Reasons, compute_part
+from pendmap.comparison.forecast import Reasons, compute_part
 from pendmap.diagnosis.refit import find_equivalents, profile_intervals
 from pendmap.identification.parameters import interval
 from pendmap.model import Effect

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from pendmap.comparison.data import DataSplit
-    from pendmap.comparison.replay import Reasons
+    from pendmap.comparison.forecast import Reasons
     from pendmap.diagnosis.candidates import Candidate
     from pendmap.diagnosis.scores import Scores
     from pendmap.diagnosis.state import Attempt, ScoredModel

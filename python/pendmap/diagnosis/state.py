@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.comparison.forecast import noise_rms, share_closed
-from pendmap.comparison.replay import Fits
+from pendmap.comparison.forecast import Fits, noise_rms, share_closed
 from pendmap.diagnosis.candidates import ZERO, commonness, count_choices, list_candidates
 from pendmap.diagnosis.fitted_model import (
     converge,

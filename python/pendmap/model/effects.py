@@ -7,7 +7,7 @@ import difflib
 import functools
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from pendmap.errors import InputError, check_flag, check_keys, check_number, short_repr
 
@@ -15,22 +15,6 @@ if TYPE_CHECKING:
     from collections.abc import Collection
 
     from pendmap.units import Units
-
-
-class Described(Protocol):
-    """Interface of formulas used by :class:`Effect`; :class:`pendmap.Formula` implements it."""
-
-    @property
-    def name(self) -> str:
-        """Name of the formula."""
-
-    @property
-    def definition(self) -> EffectDefinition:
-        """Definition, like that of an effect of the library."""
-
-    @property
-    def table(self) -> dict[str, Any]:
-        """Table of the formula in a model file."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -207,7 +191,7 @@ class Effect:
     ci95: Mapping[str, tuple[float, float]] = dataclasses.field(default_factory=dict)
     probability: float | None = None
     approximate: bool | None = None
-    formula: Described | None = None
+    formula: Any = None  # a Formula, which makes effects itself
 
     def __post_init__(self) -> None:
         if self.formula is not None and self.formula.name != self.name:

@@ -28,7 +28,6 @@ def load_model(
     ``parameters`` and may have ``ci95``, ``probability`` and ``approximate``; each ``[[formula]]``
     is a :class:`Formula`, which effects may name; ``[covariance]`` and ``[provenance]`` are kept in
     the model's ``notes``; typed parameters are known exactly and are removed from the covariance.
-    Editors complete keys from the JSON Schema that ``python -m pendmap.model.schema`` prints.
 
     Parameters
     ----------

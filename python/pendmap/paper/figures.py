@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
-import csv
 import functools
+import math
 import re
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+import numpy as np
+import pandas as pd
+
+from pendmap.charts import names, plane
+from pendmap.charts.chart import Axis, Chart, Panel, holding
+from pendmap.charts.marks import Line, Points
 from pendmap.errors import InputError
-from pendmap.files import whole_file
+from pendmap.files import facts, whole_file
+from pendmap.units import Units
 
 if TYPE_CHECKING:
     import os
+    from collections.abc import Sequence
 
     import xarray as xr
 
@@ -33,6 +41,8 @@ FIGURES: Final = {
     TABLE: "Damping by each method, and the errors of its simulation (%)",
 }
 """Titles of the figures, by the names a user types."""
+HISTORY, CURVE = 60, 100  # Periods of time history and phase curve of figure 2, the first ones
+_INK = "#1d3557"
 _TRANSIENT: Final = 500  # Forcing periods before figure 2 begins
 _RIG: Final = "virtual rig like the paper's: w0 6.2 rad/s, c/m 0.0496 1/s, Tr 0.08 rad/s²"
 _PARTS: Final = {"4": "record", "5": "decrement", "6": "decay", "7": "errors", TABLE: "table"}
@@ -44,7 +54,6 @@ PRINTED: Final = {
 }
 """The paper's table 1, percent: periods of 0.26 s and 1.54 s, peaks of 1.2 rad and 2.53 rad."""
 _PRINTED_HEAD: Final = ("period 0.26 s", "period 1.54 s", "peak 1.2 rad", "peak 2.53 rad")
-
 _SQUARES: Final = (0.05, 1.6)  # Range of alpha^2 of figure 1
 _HIGHEST: Final = 2.6  # Largest e of figure 1
 _COLUMNS: Final = 120  # Number of frequencies of figure 1
@@ -52,12 +61,9 @@ _COLUMNS: Final = 120  # Number of frequencies of figure 1
 
 def wanted(name: str) -> list[str]:
     """Return the keys of :data:`FIGURES` for a name like ``4``, ``figure 4`` or ``all``."""
-    text = re.sub(r"[\s_.-]+", "", name.lower())
-    text = re.sub(r"^(figure|fig)(?=\d)", "", text)
-    if text == "all":
-        return list(FIGURES)
-    if text in FIGURES:
-        return [text]
+    key = re.sub(r"[\s_.-]+|^fig(ure)?(?=[\s_.-]*\d)", "", name.lower())
+    if key in FIGURES or key == "all":
+        return list(FIGURES) if key == "all" else [key]
     there = f"{', '.join(key for key in FIGURES if key != TABLE)}, {TABLE} and all"
     raise InputError(f"figure must be one of the paper's ({there}), got {name!r}")
 
@@ -65,8 +71,6 @@ def wanted(name: str) -> list[str]:
 @functools.lru_cache(maxsize=1)
 def report(seed: int = 0) -> IdentificationReport:
     """Return the damping identified from the virtual rig's record, written and read as a file."""
-    import numpy as np  # noqa: PLC0415 (names are checked without it)
-
     from pendmap.identification import identify  # noqa: PLC0415
     from pendmap.records import read_experiment  # noqa: PLC0415
     from pendmap.virtual_rig import paper_decay  # noqa: PLC0415
@@ -92,6 +96,46 @@ def tumbling(periods: int = 6000) -> list[xr.Dataset]:
     return runs
 
 
+def tumbling_chart(runs: Sequence[xr.Dataset], title: str | None = None) -> Chart:
+    """Return time history, phase plane and Poincare section of trajectories, one a column."""
+    gammas = sorted({float(run["gamma"]) for run in runs})
+    damping = ", ".join(f"{gamma:g}" for gamma in gammas)
+    periods, points = (min(run.sizes["period"] for run in runs), CURVE), runs[0].sizes["period"]
+    shared = (
+        f"γ = {damping};   time history, phase plane ({min(periods)} "
+        f"periods), Poincaré section ({points} points)"
+    )
+    rows = list(zip(*(_column(run, k) for k, run in enumerate(runs)), strict=True))
+    size = (0.6 + 3.1 * len(runs), 9.0)
+    return Chart(title or "Trajectories", shared, rows, heights=(0.7, 1.0, 1.0), size=size)
+
+
+def _column(run: xr.Dataset, k: int) -> list[Panel]:
+    """Return time history, phase plane and section of a trajectory."""
+    attrs = facts(run)
+    units = Units.of(attrs)
+    point = f"p = {attrs['p']:g}, ω = {attrs['omega']:g}"
+    part, whole = _first(run, HISTORY), _first(run, CURVE)
+    time, theta = part["time"].to_numpy(), part["theta"].to_numpy()
+    clock = Axis(names.clock(units), (float(time[0]), float(time[-1])))
+    history = Line(time, theta, colour=_INK, width=0.8)
+    curve = plane.broken_at_wrap(whole["theta"].to_numpy(), whole["velocity"].to_numpy())
+    sides = names.phase_plane((-math.pi, math.pi), holding(run["velocity"].to_numpy()), units)
+    section = run["section_theta"].to_numpy(), run["section_velocity"].to_numpy()
+    up = Axis(names.ANGLE, holding(theta), "angle")
+    return [
+        Panel(f"history {k}", point, clock, up, [history]),
+        Panel(f"phase {k}", "", *sides, [Line(*curve.T, colour=_INK, width=0.35)]),
+        Panel(f"section {k}", "", *sides, [Points(*section, colour=_INK, size=0.8)]),
+    ]
+
+
+def _first(run: xr.Dataset, periods: int) -> xr.Dataset:
+    """Return the first periods of a trajectory."""
+    last = run["section_time"].to_numpy()[min(periods, run.sizes["period"] - 1)]
+    return run.sel(time=slice(None, last))
+
+
 def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
     """Draw a figure, or the table, into a .png, .svg or .pdf.
 
@@ -104,18 +148,17 @@ def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
     from pendmap.charts import comparison, identification, tongues  # noqa: PLC0415
     from pendmap.model import PRESETS  # noqa: PLC0415
     from pendmap.paper import motions, pendulum  # noqa: PLC0415
-    from pendmap.paper import tumbling as chaos  # noqa: PLC0415
 
-    (key,) = wanted(key) if key != "all" else ("all",)
-    if key not in FIGURES:
-        raise InputError(f"key must be one figure, got {key!r}")
+    if key == "all":
+        raise InputError("key must be one figure, got 'all'")
+    (key,) = wanted(key)
     number = "Table 1" if key == TABLE else f"Figure {key}"
     title = f"{number}: {FIGURES[key][0].lower()}{FIGURES[key][1:]}"
     if key == "1":
         marks = [(one.p, one.omega, name[-1]) for name, one in sorted(PRESETS.items())]
         return render.draw(tongues.chart(_critical(), title=title, marks=marks), path)
     if key == "2":
-        return render.draw(chaos.chart(tumbling(), title), path)
+        return render.draw(tumbling_chart(tumbling(), title), path)
     if key == "3":
         return render.draw(pendulum.chart(title=title), path)
     if key in ("8", "9"):
@@ -124,19 +167,13 @@ def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
         subtitle = f"{_RIG};   model by the combined method, repaired; seed {seed}"
         chart = comparison.steady if key == "8" else comparison.tumbling
         return render.draw(chart(runs, title, subtitle), path)
-    subtitle = (
-        f"{_RIG}, release at 3.0 rad, 100 Hz;   4096 counts, noise 0.1°, zero off by 0.05°, "
-        f"seed {seed}"
-    )
-    parts = (_PARTS[key],)
-    sheet = identification.sheet(report(seed), parts=parts, title=title, subtitle=subtitle)
-    return render.draw(sheet, path)
+    subtitle = f"{_RIG}, release at 3.0 rad, 100 Hz;   4096 counts, noise 0.1°, zero off by 0.05°"
+    words = {"title": title, "subtitle": f"{subtitle}, seed {seed}"}
+    return render.draw(identification.sheet(report(seed), parts=(_PARTS[key],), **words), path)
 
 
 def _critical() -> xr.Dataset:
     """Return the critical curves of figure 1: alpha^2 up to 1.6, e up to 2.6."""
-    import numpy as np  # noqa: PLC0415
-
     from pendmap.analysis.tongues import tongues  # noqa: PLC0415
     from pendmap.model import Pendulum  # noqa: PLC0415
 
@@ -153,16 +190,12 @@ def printed_table() -> tuple[list[str], list[list[str]]]:
 
 def write_table(report: IdentificationReport, path: str | os.PathLike[str]) -> Path:
     """Write table 1 as CSV, in percent; a cell is empty if the simulation is at rest by then."""
-    names = [name for name, method in report.methods.items() if method.applicable]
-    with (
-        whole_file(path, [".csv"]) as part,
-        part.open("w", encoding="utf-8", newline="") as file,
-    ):
-        out = csv.writer(file, lineterminator="\n")
-        out.writerow(["what", "measured", "unit", *(f"{name}_percent" for name in names)])
-        for row in report.table.rows:
-            errors = [row.errors.get(name, float("nan")) for name in names]
-            cells = ["" if error != error else repr(float(error)) for error in errors]  # noqa: PLR0124
-            unit = "s" if row.what == "period" else "rad"
-            out.writerow([row.what, repr(float(row.measured)), unit, *cells])
+    methods = [name for name, method in report.methods.items() if method.applicable]
+    table = pd.DataFrame(
+        {"what": row.what, "measured": row.measured, "unit": "s" if row.what == "period" else "rad"}
+        | {f"{name}_percent": row.errors.get(name) for name in methods}
+        for row in report.table.rows
+    )
+    with whole_file(path, [".csv"]) as part:
+        table.to_csv(part, index=False, lineterminator="\n")
     return Path(path)

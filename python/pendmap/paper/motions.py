@@ -8,6 +8,16 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+import numpy as np
+from scipy.ndimage import distance_transform_edt
+
+from pendmap import virtual_rig
+from pendmap.analysis.basins import basins
+from pendmap.analysis.grid import Axis, Grid
+from pendmap.comparison import Ensemble, compare
+from pendmap.records import read_experiment
+from pendmap.virtual_rig import RunPlan, experiment
+
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
@@ -50,12 +60,6 @@ def tumbling(model: Rig, seed: int = 0) -> list[ForcedComparison]:
 
 def _inside(model: Rig, kind: str, n: int, w: int) -> tuple[float, float]:
     """Return the start in the basin of an attractor that is farthest from any other basin."""
-    import numpy as np  # noqa: PLC0415 (this module is imported for its numbers)
-    from scipy.ndimage import distance_transform_edt  # noqa: PLC0415
-
-    from pendmap.analysis.basins import basins  # noqa: PLC0415
-    from pendmap.analysis.grid import Axis, Grid  # noqa: PLC0415
-
     grid = Grid(Axis(-math.pi, math.pi, _CELLS), Axis(-_FASTEST, _FASTEST, _CELLS))
     result = basins(model, grid, check=False)
     wanted = (result["kind"] == kind) & (result["n"] == n) & (result["w"] == w)
@@ -70,11 +74,6 @@ def _beside(
     model: Rig, starts: Iterable[tuple[float, ...]], seconds: float, seed: int, members: int = 400
 ) -> list[ForcedComparison]:
     """Compare a model with records of the virtual rig from starts (p, Omega / w0, th, v)."""
-    from pendmap import virtual_rig  # noqa: PLC0415 (likewise)
-    from pendmap.comparison import Ensemble, compare  # noqa: PLC0415 (likewise)
-    from pendmap.records import read_experiment  # noqa: PLC0415
-    from pendmap.virtual_rig import RunPlan, experiment  # noqa: PLC0415
-
     truth = experiment.PARAMETERS
     request = virtual_rig.Request(
         preset="forced",

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pendmap import _core
-from pendmap.comparison.replay import LOST, effect_strength
+from pendmap.comparison.forecast import LOST, effect_strength
 from pendmap.diagnosis.advice import DETECTION_PROBABILITY
 from pendmap.diagnosis.result import SAID, as_text, ranking_table, shape_text
 from pendmap.formatting import Estimate, estimate_text, interval
@@ -21,7 +21,7 @@ from pendmap.report.markdown import as_page, markdown_templates
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from pendmap.comparison.replay import Strength
+    from pendmap.comparison.forecast import Strength
     from pendmap.diagnosis import Discrepancy
 
 

@@ -7,7 +7,7 @@ the package agrees with itself.
 
 from __future__ import annotations
 
-from pendmap.virtual_rig.catalogue import EFFECTS, describe
+from pendmap.virtual_rig.effects import EFFECTS, describe
 from pendmap.virtual_rig.experiment import Experiment, Request, Run, make, paper_decay
 from pendmap.virtual_rig.presets import PRESETS, RunPlan
 from pendmap.virtual_rig.writer import Places, held_out, places, write

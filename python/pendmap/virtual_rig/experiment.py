@@ -9,21 +9,19 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.errors import InputError
-from pendmap.virtual_rig.catalogue import draw, draws_size
+from pendmap.virtual_rig.effects import draw, draws_size
 from pendmap.virtual_rig.effects.base import Drive
 from pendmap.virtual_rig.effects.readings import read
 from pendmap.virtual_rig.equation import Equation, Parameters
 from pendmap.virtual_rig.integrator import integrate
 from pendmap.virtual_rig.lanes import Starts
-from pendmap.virtual_rig.mess import Mess
 from pendmap.virtual_rig.presets import PRESETS, RunPlan
-from pendmap.virtual_rig.sensor import Sensor, check_ranges
+from pendmap.virtual_rig.sensor import Mess, Sensor, check_ranges
 
 if TYPE_CHECKING:
     from pendmap.virtual_rig.effects.base import Effect
     from pendmap.virtual_rig.path import Floats, Path
 
-WINDOW: Final = 1.0  # Length of segments over which the gap is measured, s; limits chaotic growth
 _AFTER_REST: Final = 3.0  # Time recorded after the pendulum has come to rest, s
 _MOST_SAMPLES: Final = 10_000_000
 """Largest number of samples of all runs; their records take 250 megabytes."""
@@ -44,7 +42,7 @@ class Request:
         Effects to hide, with parameters if wanted (``magnet:dipole,amplitude=0.1,d=0.2``), ``any``,
         which the seed chooses, or ``none`` alone; by default none, hidden: any.
     size : float
-        Multiplies the size of every effect that is drawn; above 0, and 1 if none is drawn.
+        Multiplies the size of every effect that is drawn; 1 if none is drawn.
     w0 : float
         Natural frequency, rad/s; by default 6.0 to 6.4.
     c_over_m : float
@@ -113,14 +111,14 @@ class Request:
             raise InputError(f"experiment must be one of {known}, got {self.preset!r}")
         if self.seed < 0:
             raise InputError(f"seed must be 0 or more, got {self.seed}")
-        if not (math.isfinite(self.size) and self.size > 0):
-            raise InputError(f"size must be a finite number above 0, got {self.size:g}")
         # A rig far outside these ranges takes too long: steps follow its shortest time scale.
         check_ranges(
             self,
+            size=(1e-9, 1e9, ""),
             w0=(0.1, 100.0, "rad/s"),
             c_over_m=(0.0, 100.0, "1/s"),
             duration=(1.0, 3600.0, "s"),
+            noise=(0.0, 180.0, "degrees"),
             mess=(0.0, 100.0, ""),
         )
         if self.theta_r is not None and self.friction is not None:
@@ -158,12 +156,11 @@ class Request:
             raise InputError(f"one of {asked[0]} and plans must be left out, got both")
         for k, plan in enumerate(self.plans):
             numbers = (plan.theta, plan.velocity, plan.p, plan.frequency, plan.phase, plan.lab_time)
-            if plan.kind not in {"free", "forced"}:
-                raise InputError(f"plan {k}: kind must be free or forced, got {plan.kind!r}")
-            if not (1 <= plan.duration <= 3600 and all(map(math.isfinite, numbers))):  # noqa: PLR2004
+            usual = plan.kind in {"free", "forced"} and all(map(math.isfinite, numbers))
+            if not (usual and 1 <= plan.duration <= 3600):  # noqa: PLR2004
                 raise InputError(
-                    f"plan {k}: duration must be a number from 1 to 3600 s, and all numbers "
-                    f"finite, got {plan.duration:g} s from {plan.theta:g} rad"
+                    f"plan {k} must be free or forced, take 1 to 3600 s and have finite numbers, "
+                    f"got {plan}"
                 )
 
     @property
@@ -190,7 +187,6 @@ class Run:
     time: Floats  # The record, s, shape (N,)
     angle: Floats  # rad, shape (N,)
     lost: int  # Number of samples lost from the record
-    gap: float  # Rms change of the reading by the effects within a second, rad, without a refit
 
 
 @dataclasses.dataclass(frozen=True)
@@ -203,12 +199,6 @@ class Experiment:
     sensor: Sensor
     runs: list[Run]
     mess: Mess | None = None
-
-    @property
-    def gap(self) -> float:
-        """Rms change of the reading by the effects within a second, rad, over all samples."""
-        weights = [run.time.size for run in self.runs]
-        return math.sqrt(float(np.average([run.gap**2 for run in self.runs], weights=weights)))
 
 
 def make(request: Request) -> Experiment:
@@ -261,31 +251,16 @@ def make(request: Request) -> Experiment:
     paths = _integrate(equation, plans, readings)
     if preset.until_rest and request.duration is None and not request.plans:
         plans = [_until_rest(*pair) for pair in zip(plans, paths, strict=True)]
-    instants = [
-        sensor.instants(sensor.times(plan.duration), request.stream(_SENSOR, k, 1))
-        for k, plan in enumerate(plans)
-    ]
-    deviations = [np.zeros_like(times) for times in instants]
-    if others:
-        deviations = _deviations(Equation(parameters, drive, lab, bearing), paths, instants)
     runs = []
     for k, (plan, path) in enumerate(zip(plans, paths, strict=True)):
-        reading = read(path, _true(instants[k], readings), readings)
-        gap = reading - path.angle(instants[k]) + deviations[k]
+        times = sensor.times(plan.duration)
+        instants = sensor.instants(times, request.stream(_SENSOR, k, 1))
+        reading = read(path, _true(instants, readings), readings)
         if mess is not None:
-            at = plan.lab_time + instants[k]
+            at = plan.lab_time + instants
             reading = reading + mess.reading(at, sensor, request.stream(_MESS, k, 1))
         angle, keep = sensor.write_down(reading, request.stream(_SENSOR, k, 0))
-        runs.append(
-            Run(
-                plan=plan,
-                path=path,
-                time=sensor.times(plan.duration)[keep],
-                angle=angle[keep],
-                lost=int((~keep).sum()),
-                gap=math.sqrt(float(np.mean(gap**2))),
-            )
-        )
+        runs.append(Run(plan, path, times[keep], angle[keep], int((~keep).sum())))
     return Experiment(request, parameters, effects, sensor, runs, mess)
 
 
@@ -293,8 +268,6 @@ def _sensor(request: Request, rng: np.random.Generator) -> Sensor:
     low, high = PRESETS[request.preset].noise
     drawn = math.exp(rng.uniform(math.log(low), math.log(high)))
     noise = drawn if request.noise is None else request.noise
-    if not (math.isfinite(noise) and 0 <= noise <= 180):  # noqa: PLR2004 (degrees)
-        raise InputError(f"noise must be a number from 0 to 180 degrees, got {noise:g}")
     shared = {field.name for field in dataclasses.fields(Sensor)} - {"noise"}
     settings: dict[str, Any] = {name: getattr(request, name) for name in shared}
     return Sensor(noise=math.radians(noise), **settings)
@@ -335,29 +308,6 @@ def _until_rest(plan: RunPlan, path: Path) -> RunPlan:
         return plan
     end = math.ceil(path.events[-1].time + _AFTER_REST)
     return dataclasses.replace(plan, duration=min(plan.duration, float(end)))
-
-
-def _deviations(plain: Equation, paths: list[Path], instants: list[Floats]) -> list[Floats]:
-    """Return the motion minus that of a rig without effects, restarted on it every second, rad."""
-    begins = [np.arange(0.0, max(times[-1], WINDOW / 2), WINDOW) for times in instants]
-    ends = [np.append(begin[1:], times[-1]) for begin, times in zip(begins, instants, strict=True)]
-    starts = Starts(
-        run=np.repeat(np.arange(len(paths)), [begin.size for begin in begins]),
-        begin=np.concatenate(begins),
-        end=np.concatenate(ends),
-        theta=np.concatenate([path.angle(t) for path, t in zip(paths, begins, strict=True)]),
-        velocity=np.concatenate([path.velocity(t) for path, t in zip(paths, begins, strict=True)]),
-    )
-    pieces = iter(integrate(plain, starts))
-    result = []
-    for path, begin, times in zip(paths, begins, instants, strict=True):
-        which = np.clip(np.searchsorted(begin, times, side="right") - 1, 0, begin.size - 1)
-        other = np.empty_like(times)
-        for n in range(begin.size):
-            mine = which == n
-            other[mine] = next(pieces).angle(times[mine])
-        result.append(path.angle(times) - other)
-    return result
 
 
 PARAMETERS: Final = Parameters(w0=6.2, c_over_m=2 * 0.004 * 6.2, friction=0.08)

@@ -57,7 +57,7 @@ def _commit(lanes: Lanes, step: Step) -> None:
     for k, i in zip(rows.tolist(), lane.tolist(), strict=True):
         if step.length[k] > 0:
             begin, long = float(lanes.time[i]), float(step.length[k])
-            lanes.paths[i].add(begin, long, step.theta[k], step.velocity[k])
+            lanes.paths[i].steps.append((begin, long, step.theta[k], step.velocity[k]))
     places = np.array([switches[k].place if k in switches else 1.0 for k in rows.tolist()])
     polynomials = gauss.basis(places, gauss.NODES + 2)
     ends = lanes.time[lane] + length >= lanes.stop[lane]

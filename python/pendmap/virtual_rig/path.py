@@ -89,35 +89,23 @@ class Path:
     def __init__(self, lab: float = 0.0) -> None:
         self.lab = lab
         self.events: list[Event] = []
-        self._begins: list[float] = []
-        self._lengths: list[float] = []
-        self._theta: list[Floats] = []
-        self._velocity: list[Floats] = []
-
-    def add(self, begin: float, length: float, theta: Floats, velocity: Floats) -> None:
-        """Append a step: Legendre coefficients over ``begin`` to ``begin + length``."""
-        self._begins.append(begin)
-        self._lengths.append(length)
-        self._theta.append(theta)
-        self._velocity.append(velocity)
-
-    @property
-    def steps(self) -> int:
-        """Number of steps."""
-        return len(self._begins)
+        # Begin and length, s; Legendre coefficients of angle and velocity over the step.
+        self.steps: list[tuple[float, float, Floats, Floats]] = []
 
     def angle(self, time: Floats) -> Floats:
         """Angle in rad, not wrapped, at times in s, shape (N,)."""
-        return self._at(time, self._theta, NODES + 2)
+        return self._at(time, 2, NODES + 2)
 
     def velocity(self, time: Floats) -> Floats:
         """Angular velocity in rad/s at times in s, shape (N,)."""
-        return self._at(time, self._velocity, NODES + 1)
+        return self._at(time, 3, NODES + 1)
 
-    def _at(self, time: Floats, coefficients: list[Floats], count: int) -> Floats:
-        begins = np.array(self._begins)
+    def _at(self, time: Floats, which: int, count: int) -> Floats:
+        begins, lengths, coefficients = (
+            np.array([step[k] for step in self.steps]) for k in (0, 1, which)
+        )
         step = np.clip(np.searchsorted(begins, time, side="right") - 1, 0, begins.size - 1)
-        s = (time - begins[step]) / np.array(self._lengths)[step]
+        s = (time - begins[step]) / lengths[step]
         # Places are clipped to their step, so that rounding never extrapolates.
         polynomials = basis(np.clip(s, 0.0, 1.0), count)
-        return np.asarray(np.einsum("nk,nk->n", polynomials, np.array(coefficients)[step]))
+        return np.asarray(np.einsum("nk,nk->n", polynomials, coefficients[step]))

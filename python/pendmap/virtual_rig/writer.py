@@ -44,28 +44,21 @@ def places(out: str | os.PathLike[str], *, replace: bool) -> Places:
     OSError
         If the folder above does not exist, the path is a file, or nothing may be written there.
     """
-    folder = Path(out)
-    if not folder.name or folder.name == "..":
-        folder = folder.resolve()
+    folder = Path(out).resolve() if Path(out).name in {"", ".."} else Path(out)
     if not folder.name:
         raise InputError(f"{folder}: must be a folder in another one, got the root")
     truth = folder.with_name(f"{folder.name}.truth.toml")
     if not folder.parent.is_dir():
         raise FileNotFoundError(errno.ENOENT, "the folder does not exist", str(folder.parent))
-    if folder.exists() and not folder.is_dir():
-        raise NotADirectoryError(errno.ENOTDIR, "is not a folder", str(folder))
-    full = folder.is_dir() and any(folder.iterdir())
-    if full and not replace:
-        raise InputError(
-            f"{folder}: is not empty: without --overwrite it must be a new or empty folder"
-        )
-    if full and not (truth.is_file() and all(_FILES.fullmatch(f.name) for f in folder.iterdir())):
+    files = list(folder.iterdir()) if folder.exists() else []
+    if (files or truth.exists()) and not replace:
+        there = f"{folder}: is not empty" if files else f"{truth}: exists"
+        raise InputError(f"{there}: without --overwrite it must be a new or empty folder")
+    if files and not (truth.is_file() and all(_FILES.fullmatch(file.name) for file in files)):
         raise InputError(
             f"{folder}: is not an experiment of the virtual rig only, with its truth next to it: "
             "--overwrite replaces nothing else"
         )
-    if truth.exists() and not replace:
-        raise InputError(f"{truth}: exists: without --overwrite it must be another folder")
     check_room(truth)
     return Places(folder, truth)
 
@@ -158,8 +151,6 @@ def _truth(experiment: Experiment) -> dict[str, Any]:
             "jitter_s": sensor.jitter,
         },
         **({} if experiment.mess is None else {"mess": experiment.mess.describe()}),
-        # No parameter is refitted; the comparison restarts on the true motion every second.
-        "gap_rms_rad": experiment.gap,
         "run": [_run(k, run) for k, run in enumerate(experiment.runs)],
     }
 
@@ -181,7 +172,6 @@ def _run(k: int, run: Run) -> dict[str, Any]:
         "theta0_rad": float(run.plan.theta),
         "velocity0_rad_s": float(run.plan.velocity),
         "samples_lost": run.lost,
-        "gap_rms_rad": run.gap,
     }
     if run.path.events and run.path.events[-1].what == "stick":
         entry["rests_from_s"] = run.path.events[-1].time

@@ -18,7 +18,7 @@ import pendmap
 from conftest import COMMAND
 from interrupted import started
 from pendmap import Grid, InputError, Pendulum, cli
-from pendmap.files import check_room, whole_file, whole_folder
+from pendmap.files import check_room, whole_file
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -79,13 +79,6 @@ def test_files_written_before_the_disk_is_full_are_kept(tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == ["m.nc", "m.png"]
     assert (tmp_path / "m.png").read_bytes() == b"old"
     assert pendmap.load(tmp_path / "m.nc").sizes["theta"] == 20
-
-
-def test_the_table_of_the_paper_that_does_not_fit_is_named(tmp_path: Path) -> None:
-    run = bounded(("paper", "table1"), tmp_path, 8192)
-    missed = "cannot write table_1.csv: File too large; written: nothing"
-    assert (run.returncode, run.stderr) == (1, f"pendmap: {missed}\n")
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_rig_and_a_figure_meet_a_full_disk(tmp_path: Path) -> None:
@@ -282,11 +275,3 @@ def test_an_old_zarr_is_kept_if_the_new_one_fails(tmp_path: Path) -> None:
     told = "m.zarr.part: File too large; 0 of 1 tile are kept, --resume goes on"
     assert run.stderr == f"pendmap: {told}\n"
     assert {path.name for path in tmp_path.iterdir()} == {"m.zarr", "m.zarr.part"}
-
-
-def test_a_folder_is_replaced_as_a_whole(tmp_path: Path) -> None:
-    with whole_folder(tmp_path / "new") as part:
-        part.mkdir()
-        (part / "a").touch()
-        assert not (tmp_path / "new").exists()
-    assert [path.name for path in tmp_path.iterdir()] == ["new"]

@@ -17,10 +17,8 @@ LIMIT = 6_000_000
 
 COMMANDS = [
     "basins --p 0.6 --grid 20000",
-    "basins --p 2 --theta=-3:3:100000 --velocity=-1:1:100000 --json",
     "map --p 0:1:3000 --omega 1:2:3000",
     "orbit --n 2 --w 0 --grid 100000",
-    "simulate --until 9e6 --samples 64",
     "simulate --until 5e6 --samples 100 --lyapunov --json",
 ]
 
@@ -36,7 +34,6 @@ calls = {
     "parameter_map": lambda: pendmap.parameter_map(
         pendulum, {"p": (0.1, 1.0, 20000), "gamma": (0.1, 0.2, 20000)}
     ),
-    "sweep": lambda: pendmap.sweep(pendulum, {"p": (0.1, 1.0, 20000)}, grid=2000),
     "simulate": lambda: pendmap.simulate(pendulum, 1.0, 0.0, 5e4, samples=10000),
     "basins_of": lambda: pendmap.basins_of(pendulum, *np.broadcast_to(0.5, (2, 10**9))),
     "advance": lambda: pendmap.advance(pendulum, *np.broadcast_to(0.5, (2, 10**9)), 1),

@@ -73,8 +73,10 @@ def test_formulas_and_descriptions_are_files_too(tmp_path: Path) -> None:
         pendmap.load_model(tmp_path / "large.toml")
 
 
-@pytest.mark.parametrize("part", ["a", '"a"', "'a'", '"\\""', "a "])
-@pytest.mark.parametrize("form", ["{}.b = 1", "[{}.b]", "x = {{ {}.b = 1 }}", "[[{}]]"])
+@pytest.mark.parametrize(
+    ("part", "form"),
+    [("a", "{}.b = 1"), ('"a"', "[{}.b]"), ('"\\""', "x = {{ {}.b = 1 }}"), ("a ", "[[{}]]")],
+)
 def test_a_key_has_no_more_parts_than_are_read(tmp_path: Path, part: str, form: str) -> None:
     path = tmp_path / "deep.toml"
     path.write_text(form.format(".".join([part] * 30_000)))
@@ -85,8 +87,7 @@ def test_a_key_has_no_more_parts_than_are_read(tmp_path: Path, part: str, form: 
         pendmap.load_model(path)
 
 
-@pytest.mark.parametrize("columns", [MOST_COLUMNS + 1, 20_000, 1_000_000])
-@pytest.mark.parametrize("cell", ["0.5", ""])
+@pytest.mark.parametrize(("columns", "cell"), [(MOST_COLUMNS + 1, "0.5"), (1_000_000, "")])
 def test_a_table_has_no_more_columns_than_are_read(tmp_path: Path, columns: int, cell: str) -> None:
     row = ",".join([cell or "1.5", *[cell] * (columns - 1)])
     file = tmp_path / "wide.csv"
@@ -145,7 +146,7 @@ def test_a_small_result_does_not_unpack_to_more_than_the_memory(tmp_path: Path) 
         pendmap.load(file)
 
 
-@pytest.mark.parametrize("version", [0, 2, 4, 1.5, "1", "x", float("nan"), [1, 2]])
+@pytest.mark.parametrize("version", [0, 2, 4, "1", float("nan")])
 def test_an_unknown_format_is_refused(tmp_path: Path, version: object) -> None:
     attrs = {"format_version": version, "kind": "basins"}
     xr.Dataset({"x": ("t", [1.0])}, attrs=attrs).to_netcdf(tmp_path / "r.nc", engine="netcdf4")

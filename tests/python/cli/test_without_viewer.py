@@ -32,7 +32,6 @@ def bare(tmp_path: Path) -> Run:
     "words",
     [
         ("basins", "--p", 0.6, "--grid", 20),
-        ("simulate", "--until", 20),
         ("melnikov",),
         ("identify", "decay"),
     ],
@@ -56,7 +55,6 @@ def test_a_recording_by_default_is_left_out_and_named(
 @pytest.mark.parametrize(
     "words",
     [
-        ("basins", "--rerun", "x.rrd"),
         ("basins", "--view"),
         ("simulate", "--live"),
         ("view", "x.rrd"),
@@ -81,9 +79,3 @@ def test_a_parquet_file_is_refused_in_one_line(bare: Run, tmp_path: Path) -> Non
     text = "a.parquet: a Parquet file needs the extra pendmap[viewer] (pyarrow)"
     assert run.stderr.startswith(f"pendmap: {text}")
     assert len(run.stderr.splitlines()) == 1
-
-
-def test_all_but_recordings_is_the_same(bare: Run, pendmap_command: Run) -> None:
-    words = ("basins", "--p", 0.6, "--grid", 20, "--json")
-    ends = [run(*words).stdout.partition('"seconds"')[0] for run in (bare, pendmap_command)]
-    assert ends[0] == ends[1] != ""

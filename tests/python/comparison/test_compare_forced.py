@@ -14,8 +14,8 @@ import pendmap
 from driven_decays import motion
 from pendmap import InputError, Rig, virtual_rig
 from pendmap.comparison import Ensemble, compare
-from pendmap.comparison.forced import Start, Statistic, simulated_readings
-from pendmap.comparison.steady import Cycle
+from pendmap.comparison.forced import Statistic, drawn_starts, simulated_readings
+from pendmap.comparison.itinerary import Cycle
 from pendmap.identification.runs import FitRun
 from pendmap.records import Experiment, Run, read_experiment
 from pendmap.virtual_rig import RunPlan
@@ -70,14 +70,15 @@ def test_members_are_trajectories_of_the_model(
 
 def test_the_error_of_the_start_follows_from_the_noise(tmp_path: Path) -> None:
     experiment = made(tmp_path, forced(1.0, 2.0, 20.0))
-    start = compare(RIG, experiment, ensemble=Ensemble(members=20)).forced[0].start
-    assert abs(start.theta - 1.0) < 4 * start.stderr[0] < 0.004
-    assert abs(start.velocity - 2.0) < 4 * start.stderr[1] < 0.02
-    theta, velocity = start.drawn(20_000, 0.01, 6.2, seed=3)
-    assert (theta[0], velocity[0]) == (start.theta, start.velocity)
-    assert theta.std() == pytest.approx(math.hypot(0.01, start.stderr[0]), rel=0.03)
-    assert velocity.std() == pytest.approx(math.hypot(0.062, start.stderr[1]), rel=0.03)
-    assert np.ptp(Start(0.0, 1.0, 2.0, np.zeros((2, 2))).drawn(9, 0.0, 6.2, seed=3)[0]) == 0
+    one = compare(RIG, experiment, ensemble=Ensemble(members=20)).forced[0]
+    error = one.start_stderr
+    assert abs(one.start[0] - 1.0) < 4 * error[0] < 0.004
+    assert abs(one.start[1] - 2.0) < 4 * error[1] < 0.02
+    ensemble = Ensemble(members=20_000, spread=0.01, seed=3)
+    drawn = drawn_starts(one.start, np.diag(np.square(error)), ensemble, 6.2)
+    assert tuple(drawn[:, 0]) == one.start
+    for values, spread, stderr in zip(drawn, (0.01, 0.062), error, strict=True):
+        assert values.std() == pytest.approx(math.hypot(spread, stderr), rel=0.03)
 
 
 @pytest.mark.thorough
@@ -94,7 +95,7 @@ def test_statistics_accept_the_true_model_and_reject_another(tmp_path: Path) -> 
     assert min(one.statistics[1].measured for one in true.forced) > 10
     slower = dataclasses.replace(RIG, w0=4.2)
     other = compare(slower, experiment, ensemble=Ensemble(members=200))
-    assert all("greatest velocity" in {s.name for s in one.unlike} for one in other.forced)
+    assert all(one.statistics[4].chance < 0.01 for one in other.forced)
     assert min(one.rms / one.sigma for one in other.forced) > 3
 
 
@@ -256,16 +257,19 @@ def test_the_command_compares_both_kinds_of_run(tmp_path: Path, pendmap_command:
     words = ("compare", "m.toml", "lab", "--members", 50)
     run = pendmap_command(*words, "--plot", "c.png")
     assert run.returncode == 0, run.stderr
-    for text in ("escapes from a well", "95 % of its ensemble", "peaks, rms", "Written: c.png"):
+    for text in ("escapes from a well", "95 % of ensemble", "peaks, rms", "Written: c.png"):
         assert text in run.stdout
     assert (tmp_path / "c.png").stat().st_size > 50_000
     first, second = json.loads(pendmap_command(*words, "--json").stdout)["runs"]
     assert (first["kind"], second["kind"]) == ("free", "forced")
     assert second["members"] == 50
-    what = {row["what"]: row for row in second["statistics"]}
-    assert what["wells visited"]["measured"] == 1
-    assert what["time to settle"]["measured"] is None
+    what = {row["quantity"]: row for row in second["quantities"]}
+    assert what["wells visited"]["record"] == 1
+    assert what["time to settle"]["record"] is None
     assert 0 < what["greatest velocity"]["chance"] <= 1
+    assert {"residual", "periods, rms", "peaks, rms"} <= {
+        r["quantity"] for r in first["quantities"]
+    }
     assert second["drive"] == {"p": 0.6, "Omega": 12.0, "phi": 0.4}
     again = json.loads(pendmap_command(*words, "--json", "--threads", 1).stdout)["runs"][1]
     assert again == second

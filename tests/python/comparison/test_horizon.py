@@ -9,15 +9,13 @@ import numpy as np
 import pytest
 
 from hidden import once
-from pendmap import Rig
 from pendmap.comparison import compare
-from pendmap.comparison.forecast import compare_forecasts
-from pendmap.comparison.replay import Motion, effect_strength, run_forward
+from pendmap.comparison.forecast import compare_forecasts, effect_strength
 from pendmap.diagnosis import diagnosed_model
-from pendmap.identification.runs import FitRun
 
 if TYPE_CHECKING:
     from pendmap.diagnosis import Discrepancy
+    from pendmap.identification.runs import FitRun
 
 
 @pytest.fixture
@@ -58,16 +56,6 @@ def test_periods_and_peaks_are_those_of_a_simulation(found: Discrepancy) -> None
         np.mean([one.errors[name].peak_rms for one in found.cycles]) for name in ("before", "after")
     )
     assert after < 0.5 * before
-
-
-def test_a_replay_without_other_torques_falls_freely() -> None:
-    """From upright rest, ``th - pi = a cosh(w0 t)`` for small deviations."""
-    time = np.linspace(0.0, 0.5, 51)
-    run = FitRun(time, np.zeros(51), 1e-9)
-    ((readings, curve),) = run_forward(Motion(Rig(w0=6.0), {}), [run], [(np.pi - 1e-5, 0.0)])
-    expected = np.pi - 1e-5 * np.cosh(6.0 * time)
-    np.testing.assert_allclose(readings, expected, atol=1e-9)
-    np.testing.assert_allclose(curve[0], expected, atol=1e-9)
 
 
 def test_the_strength_of_a_drag_is_its_torque_on_the_motion(found: Discrepancy) -> None:

@@ -167,7 +167,7 @@ def test_help_says_which_files_json_alone_writes(pendmap_command: Run) -> None:
         (("lab", "--effects", "own.toml", "--out", "./own.toml"), "--out"),
         (("record.toml", "--out", "record.toml"), "--out"),
         (("lab", "--report", "lab/run.md"), "--report"),
-        (("folder/report.html", "--report", "folder"), "--report"),
+        (("folder/report.html", "--report", "folder/report.html"), "--report"),
         (("record.png", "--plot", "record.png"), "--plot"),
         (("record.rrd", "--rerun", "record.rrd"), "--rerun"),
     ],

@@ -11,6 +11,7 @@ import xarray as xr
 import pendmap
 from pendmap import InputError, Pendulum
 from pendmap.charts.registry import kinds
+from pendmap.cli.analysis import command_of
 from pendmap.files.dataset import KINDS
 
 if TYPE_CHECKING:
@@ -92,4 +93,4 @@ def test_every_kind_of_result_has_its_functions_its_figure_and_its_recording() -
 def test_an_analysis_has_one_name_in_module_dataset_and_command(kind: str) -> None:
     command, *_ = pendmap.ANALYSES[kind]
     assert importlib.import_module(f"pendmap.analysis.{kind}").SCHEMA.kind == kind
-    assert importlib.import_module(f"pendmap.cli.{command}").command.name == command
+    assert command_of(command).name == command

@@ -66,7 +66,7 @@ def test_from_a_record_to_its_basins(
     (one,) = json.loads(compared.stdout)["runs"]
     assert one["rms"] == pytest.approx(one["noise"], rel=0.05)
     assert one["period_rms_percent"] < 1
-    assert {row["what"] for row in one["table1"]} == {"period", "peak"}
+    assert {"residual", "periods, rms"} < {row["quantity"] for row in one["quantities"]}
 
 
 def test_the_whole_result_is_written_and_drawn(

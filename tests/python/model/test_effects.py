@@ -92,14 +92,6 @@ def test_a_named_effect_is_shown_as_a_table_of_a_model_file(
     assert model.effects[1].parameters == {"amplitude": 0.005, "width": 0.1}
 
 
-def test_an_unknown_name_gets_one_line(pendmap_command: Run) -> None:
-    run = pendmap_command("effects", "magnett")
-    assert run.returncode == 2
-    assert run.stdout == ""
-    assert len(run.stderr.strip().splitlines()) == 1
-    assert "magnet" in run.stderr
-
-
 @pytest.mark.parametrize("name", TORQUES)
 def test_maps_and_trajectories_agree(name: str) -> None:
     model = pendulum(name)

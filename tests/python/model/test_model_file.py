@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
-import json
 import math
-import subprocess
-import sys
 import tomllib
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +14,6 @@ from hypothesis import strategies as st
 import pendmap
 from models import EXAMPLE, written
 from pendmap import Effect, InputError, Pendulum, Rig, load_model, save_model
-from pendmap.model.schema import schema
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -112,10 +108,6 @@ def test_a_rig_reads_back_as_it_was_written(
     assert back.notes == notes
 
 
-def test_a_rig_without_drive_reads_back(tmp_path: Path) -> None:
-    assert load_model(save_model(Rig(w0=6.2), tmp_path / "model.toml")) == Rig(w0=6.2)
-
-
 def test_a_file_in_si_and_one_without_dimensions_are_equivalent(tmp_path: Path) -> None:
     rig = load_model(written(tmp_path, EXAMPLE))
     assert isinstance(rig, Rig)
@@ -158,13 +150,8 @@ EFFECT = '[pendulum]\n[[effect]]\nname = "quadratic_drag"\n'
     ("text", "complaint"),
     [
         ("", "has no table [pendulum]"),
-        ("pendulum = 3", "has no table [pendulum]"),
-        ("[[pendulum]]\n", "has no table [pendulum]"),
         ("gamma: 0.1", "not a TOML file: "),
-        ("\x00", "not a TOML file: "),
-        (b"\xff\xfe[\x00", "not a TOML file: "),
         (b"x = " + b"[" * 100_000, "not a TOML file: "),
-        ("[pendulum]\ngamma = 1\ngamma = 2\n", "not a TOML file: "),
         (
             "[pendulum]\ngamma = 0.1\n[rig]\nw0 = 6\n",
             "[rig] is not known: it must be one of [pendulum]",
@@ -184,40 +171,22 @@ EFFECT = '[pendulum]\n[[effect]]\nname = "quadratic_drag"\n'
             "c_over_n is not known: it must be c_over_m, in 1/s",
         ),
         ("[pendulum]\nlength_cm = 25\n", "length_cm is not known: it must be length_m, in m"),
-        ("[pendulum]\nlength = 0.25\n", "length is not known: it must be length_m, in m"),
-        ("[pendulum]\nstroke = 20\n", "stroke is not known: it must be stroke_mm, in mm"),
-        ("[pendulum]\nfrequency_rpm = 9\n", "it must be frequency_hz, in Hz"),
-        ("[pendulum]\nw0_hz = 1\n", "w0_hz is not known: it must be w0, in rad/s"),
-        ("[pendulum]\nTr_Nm = 1\n", "Tr_Nm is not known: it must be Tr, in rad/s^2"),
         ("[pendulum]\nlab_time_h = 1\n", "it must be lab_time_s, in s"),
         ("[pendulum]\ngama = 1\n", f"gama is not known, perhaps gamma is meant: {KNOWN}"),
-        ("[pendulum]\nxyzzy = 1\n", f"xyzzy is not known: {KNOWN}"),
         ('[pendulum]\n"a\\nb" = 1\n', r"'a\nb' is not known"),
         # both kinds
         (
             "[pendulum]\nw0 = 6\ngamma = 0.1\n",
             "gamma has no dimensions and w0 is in SI: both must be of one kind; gamma is c_over_m",
         ),
-        ("[pendulum]\nw0 = 6\nomega = 2\n", "omega is Omega in SI"),
         ("[pendulum]\nw0 = 6\nlab_time = 2\n", "lab_time is lab_time_s in SI"),
-        ("[pendulum]\nTr = 1\ntheta_r = 2\n", "theta_r is Tr in SI"),
         # numbers
         ("[pendulum]\ngamma = 'x'\n", "gamma must be a number, got 'x'"),
-        ("[pendulum]\ngamma = '0.1'\n", "gamma must be a number, got '0.1'"),
         ("[pendulum]\ngamma = nan\n", "gamma must be a finite number, got nan"),
-        ("[pendulum]\np = -inf\nomega = 1\n", "p must be a finite number, got -inf"),
-        ("[pendulum]\ngamma = [0.1]\n", "gamma must be a number, got [0.1]"),
         ("[pendulum]\ngamma = true\n", "gamma must be a number, got True"),
-        ("[pendulum]\ngamma = { value = 1 }\n", "gamma must be a number"),
-        (
-            "[pendulum]\ngamma = 2024-05-01\n",
-            "gamma must be a number, got datetime.date(2024, 5, 1)",
-        ),
         ("[pendulum]\np = 1\n", "p without omega: a drive needs a frequency above 0"),
         ("[pendulum]\nw0 = '6.2 rad/s'\n", "w0 must be a number, got '6.2 rad/s'"),
-        ("[pendulum]\nw0 = 6\nY = [1]\n", "Y must be a number, got [1]"),
         ("[pendulum]\nc_over_m = 1\n", "w0 is missing: a model in SI needs w0 in rad/s, or length"),
-        ("[pendulum]\nzeta = '1'\n", "zeta must be a number, got '1'"),
         # contradictions
         (
             "[pendulum]\ngamma = 0.1\nzeta = 0.1\n",
@@ -245,10 +214,6 @@ EFFECT = '[pendulum]\n[[effect]]\nname = "quadratic_drag"\n'
             "[pendulum]\ngamma = 0.1\n" + VISCOUS,
             "gamma is 0.1, the same term as the effect viscous_damping: one of them must",
         ),
-        (
-            "[pendulum]\nw0 = 6\nTr = 0.1\n" + COULOMB,
-            "Tr is 0.1, the same term as the effect coulomb_friction: one of them must",
-        ),
     ],
 )
 def test_errors_are_reported_on_one_line(tmp_path: Path, text: str | bytes, complaint: str) -> None:
@@ -261,20 +226,12 @@ def test_errors_are_reported_on_one_line(tmp_path: Path, text: str | bytes, comp
     assert len(str(error.value)) < 400
 
 
-def test_a_missing_file_and_a_folder_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(FileNotFoundError):
-        load_model(tmp_path / "absent.toml")
-    with pytest.raises(IsADirectoryError):
-        load_model(tmp_path)
-
-
 @pytest.mark.parametrize(
     ("notes", "complaint"),
     [
         ({"rig": {}}, "rig is not known: it must be one of covariance, provenance"),
         ({"covariance": [1]}, r"covariance must be a table \[covariance\], got \[1\]"),
         ({"covariance": {"a": None}}, "NoneType"),
-        ({"covariance": {"a": 1j}}, "complex"),
         ([1], r"notes must be a mapping, got \[1\]"),
     ],
 )
@@ -297,25 +254,3 @@ def test_only_models_are_written_and_only_as_toml(tmp_path: Path) -> None:
         save_model(Pendulum(), tmp_path / "model.json")
     with pytest.raises(FileNotFoundError):
         save_model(Pendulum(), tmp_path / "no" / "model.toml")
-
-
-def test_the_json_schema_has_the_keys_that_the_reader_takes(tmp_path: Path) -> None:
-    call = [sys.executable, "-m", "pendmap.model.schema"]
-    printed = subprocess.run(call, capture_output=True, check=True).stdout
-    assert json.loads(printed) == json.loads(json.dumps(schema()))
-    top = schema()["properties"]
-    assert tomllib.loads(EXAMPLE).keys() <= top.keys()
-    for kind, need in zip(top["pendulum"]["anyOf"], ({"w0": 6.2}, {}), strict=True):
-        for key in kind["properties"].keys() - need.keys():
-            drive = {"Omega": 7.0} if need else {"omega": 2.0}
-            table = need | (drive if key in ("p", "Y", "stroke_mm") else {})
-            table[key] = 0.2552107 if key == "length_m" else 7.0
-            load_model(
-                written(tmp_path, "[pendulum]\n" + "".join(f"{k} = {table[k]}\n" for k in table))
-            )
-    *library, own = top["effect"]["items"]["anyOf"]
-    assert own["properties"]["name"]["not"]["enum"] == [d.name for d in pendmap.effects()]
-    for found, definition in zip(library, pendmap.effects(), strict=True):
-        assert found["properties"]["name"] == {"const": definition.name}
-        parameters = found["properties"]["parameters"]
-        assert parameters["required"] == [p.name for p in definition.parameters]

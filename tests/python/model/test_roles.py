@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from typing import Any
 
 import pytest
@@ -11,9 +10,8 @@ from hypothesis import strategies as st
 
 import pendmap
 from pendmap import InputError
-from pendmap.diagnosis import candidates as search
-from pendmap.diagnosis.candidates import Candidate, list_candidates
-from pendmap.model import Effect, effects
+from pendmap.diagnosis.candidates import list_candidates
+from pendmap.model import Effect
 from pendmap.units import Units
 
 ROLES = {"size", "width", "place", "power", "order", "time constant", "phase"}
@@ -70,42 +68,6 @@ def test_a_search_begins_where_an_effect_is_weak_and_of_a_usual_shape(
             assert value == low
         else:
             assert low < value < high
-
-
-def renamed(effect: pendmap.EffectDefinition) -> pendmap.EffectDefinition:
-    """Return the definition with other names for its parameters."""
-    names: list[str | None] = [p.name for p in effect.parameters]
-    parameters = []
-    for k, parameter in enumerate(effect.parameters):
-        less = parameter.power_of_w0_less
-        other = None if less is None else f"other{names.index(less)}"
-        parameters.append(dataclasses.replace(parameter, name=f"other{k}", power_of_w0_less=other))
-    return dataclasses.replace(effect, parameters=tuple(parameters))
-
-
-def predict_limits(name: str) -> list[Any]:
-    """Return the candidates of an effect, with parameters by position."""
-    names = [p.name for p in effects.definition(name).parameters]
-    place = {f"{name}.{n}": k for k, n in enumerate(names)} | {n: k for k, n in enumerate(names)}
-
-    def of(one: Candidate) -> list[Any]:
-        shape = {place[n]: value for n, value in one.shape.items()}
-        lists = [[place[n] for n in part] for part in (one.free, one.adapted, one.places)]
-        return [shape, *lists, place[one.size]]
-
-    (shaped,) = (c for c in list_candidates((), driven=True) if c[0].name == name)
-    blank = Effect.blank(name, BARE)
-    return [[of(one) for one in shaped], blank.values, [place[n] for n in blank.sizes]]
-
-
-def test_a_search_does_not_depend_on_names_of_parameters(monkeypatch: pytest.MonkeyPatch) -> None:
-    library = effects.library()
-    names = [name for name in library if search.own_name(name) is None]
-    expected = {name: predict_limits(name) for name in names}
-    others = {n: renamed(entry) if n in names else entry for n, entry in library.items()}
-    for module in (effects, search):
-        monkeypatch.setattr(module, "library", lambda: others)
-    assert {name: predict_limits(name) for name in names} == expected
 
 
 @pytest.mark.parametrize(

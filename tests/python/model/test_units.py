@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 import pendmap
 from models import DRAG, SWING
 from pendmap import Effect, InputError, Pendulum, Rig
-from pendmap.units import Units
 
 sizes = st.floats(1e-3, 1e3)
 signed = st.floats(-1e3, 1e3)
@@ -45,18 +44,6 @@ def test_times_torques_and_effects_have_their_powers_of_w0() -> None:
     harmonic, drag = pendulum.effects
     assert harmonic.parameters == {"amplitude": 2.0, "n": 3.0, "psi": 0.5}
     assert drag.parameters == DRAG.parameters
-
-
-@pytest.mark.parametrize("effect", pendmap.effects(), ids=lambda effect: effect.name)
-def test_every_effect_converts_by_its_powers_of_w0(effect: pendmap.EffectDefinition) -> None:
-    values = {p.name: float(np.mean(np.clip(p.typical, *p.range))) for p in effect.parameters}
-    bare = Effect(effect.name, values)
-    in_si = bare.given(Units(3.0, si=True))
-    for p in effect.parameters:
-        power = p.power_of_w0 - (values[p.power_of_w0_less] if p.power_of_w0_less else 0)
-        assert in_si.parameters[p.name] == values[p.name] * 3.0**power
-    back = in_si.bare(Units(3.0, si=True))
-    assert list(back.parameters.values()) == pytest.approx(list(values.values()), rel=1e-14)
 
 
 @given(
@@ -119,27 +106,18 @@ def test_zeta_is_half_of_gamma() -> None:
             {"w0": 6.2, "p": 0.5, "stroke_mm": 20, "frequency_hz": 1.9},
             "p is 0.5, but 0.290555 by Y Omega^2/g of stroke_mm = 20, Omega = 11.9381 and",
         ),
-        (
-            {"w0": 6.2, "Y": 0.02, "stroke_mm": 10, "Omega": 12},
-            "p is 0.293578 by Y Omega^2/g of Y = 0.02, Omega = 12 and gravity = 9.81, but 0.146789",
-        ),
         ({"w0": 6.2, "Omega": 12, "frequency_hz": 12}, "Omega is 12, but 75.3982 by 2 pi f"),
         ({"w0": 6.2, "length_m": 0.3}, "w0 is 6.2, but 5.71839 by sqrt(g/l) of length_m = 0.3"),
         ({"c_over_m": 0.1}, "w0 is missing: a model in SI needs w0 in rad/s, or length_m"),
         ({"w0": 6.2, "stroke_mm": 20}, "stroke_mm needs a frequency: Omega or frequency_hz must"),
         ({"w0": 6.2, "p": 0.3}, "Omega must be a number above 0 where something is driven, got 0"),
         ({"w0": 0}, "w0 must be a number from 1e-06 to 1e+06 rad/s, got 0"),
-        ({"w0": 1e200}, "w0 must be a number from 1e-06 to 1e+06 rad/s, got 1e+200"),
         ({"length_m": -0.2}, "length_m must be a number above 0, got -0.2"),
-        ({"length_m": 1e-20}, "must be a number from 1e-06 to 1e+06 rad/s"),
         ({"w0": 6.2, "c_over_m": -1}, "c_over_m must be 0 or more, got -1"),
-        ({"w0": 6.2, "zeta": -1}, "zeta must be 0 or more, got -1"),
-        ({"w0": 6.2, "Tr": -1}, "Tr must be 0 or more, got -1"),
         ({"w0": 6.2, "gravity": 0}, "gravity must be a number above 0, got 0"),
         ({"w0": 6.2, "Omega": -2}, "Omega must be a number above 0, got -2"),
         ({"w0": 6.2, "torque": math.nan}, "torque must be a finite number, got nan"),
         ({"w0": "6"}, "w0 must be a number, got '6'"),
-        ({"w0": True}, "w0 must be a number, got True"),
         ({"w0": 6.2, "gamma": 0.1}, "gamma is not known: it must be one of w0, length_m"),
     ],
 )
@@ -152,11 +130,6 @@ def test_contradictory_values_are_refused_with_their_numbers(
     assert "\n" not in str(error.value)
 
 
-def test_rounded_digits_do_not_contradict_and_the_rig_s_own_name_has_priority() -> None:
-    rig = Rig.of(w0=6.2, p=0.2906, stroke_mm=20, frequency_hz=1.9)
-    assert rig.p == 0.2906
-
-
 # Effects
 
 
@@ -164,20 +137,12 @@ def test_rounded_digits_do_not_contradict_and_the_rig_s_own_name_has_priority() 
     ("words", "complaint"),
     [
         ({"name": "drag", "parameters": {}}, "name must be an effect of the library, got 'drag'"),
-        (
-            {"name": "quadratic_darg", "parameters": {}},
-            "the library, got 'quadratic_darg', perhaps quadratic_drag;",
-        ),
-        ({"name": 3, "parameters": {}}, "name must be an effect of the library, got 3"),
-        ({"name": ["a"], "parameters": {}}, "name must be an effect of the library, got ['a']"),
         ({"parameters": {}}, "quadratic_drag: q is missing: it needs q (1/rad)"),
         ({"parameters": {"q": 1, "r": 2}}, "quadratic_drag: parameters: r is not known"),
         ({"parameters": [1.0]}, "quadratic_drag: parameters must be a mapping of q, got [1.0]"),
         ({"parameters": {"q": "1"}}, "quadratic_drag: q must be a number, got '1'"),
-        ({"parameters": {"q": math.inf}}, "quadratic_drag: q must be a finite number, got inf"),
         ({"ci95": {"q": 1.0}}, "ci95 of q must be [low, high], got 1.0"),
         ({"ci95": {"q": [2, 1]}}, "ci95 of q must be [low, high], the lower first, got [2, 1]"),
-        ({"ci95": {"r": [1, 2]}}, "quadratic_drag: ci95: r is not known"),
         ({"probability": 2}, "quadratic_drag: probability must be a number from 0 to 1, got 2"),
         ({"approximate": "yes"}, "quadratic_drag: approximate must be True or False, got 'yes'"),
     ],

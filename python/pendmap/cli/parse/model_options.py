@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pendmap.cli.parse.groups import MODEL, SI
-from pendmap.cli.parse.options import added, option
+from pendmap.cli.parse.options import MODEL, SI, added, option
 from pendmap.cli.parse.signature import parameters
 from pendmap.cli.parse.types import FILE, NUMBER, NUMBER_OR_RANGE, RANGE, AxisText
 from pendmap.errors import InputError

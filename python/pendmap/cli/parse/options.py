@@ -1,38 +1,48 @@
-"""Options that several commands share."""
+"""Options and arguments of commands, the groups in which ``--help`` shows them, and commands."""
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import os
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 import cloup
 
-from pendmap.cli.parse.groups import LONG, MACHINE, OUTPUT, STARTS
-from pendmap.cli.parse.types import (
-    AXIS,
-    INSTRUCTION_SET,
-    INTEGER,
-    PICTURES,
-    output_file,
-    output_or_address,
-)
+from pendmap.cli.parse import types
+from pendmap.cli.parse.types import PICTURES
 from pendmap.errors import MOST_CELLS, check_whole
+from pendmap.formatting import WIDTH
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from pendmap.analysis.grid import Grid
 
-    Command = Callable[..., Any]
-    Decorator = Callable[[Command], Command]
+    Function = Callable[..., Any]
+    Decorator = Callable[[Function], Function]
 
 _SIMD = "PENDMAP_SIMD"
 """Environment variable of the instruction set, which every call of the core reads."""
-
-
 RESULTS = (".nc", ".zarr")  # Suffixes of files that a dataset is written to
+
+
+def group(title: str, example: str) -> cloup.OptionGroup:
+    """Return a group of options with an example of their use."""
+    return cloup.OptionGroup(title, help=f"Example: {example}")
+
+
+MODEL: Final = group("Model", "--p 1.7 --theta-r 0.05")
+SI: Final = group("Model in SI", "--model rig.toml --tr 0.08")
+STARTS: Final = group("Starts", "--theta=-pi:pi:400 --velocity=-3:3:200")
+START: Final = group("Start", "--theta 2.5 --velocity 0")
+ACCURACY: Final = group("Accuracy", "--tol 1e-8")
+RANDOM: Final = group("Random numbers", "--seed 1")
+LONG: Final = group("Long runs", "--out map.zarr --resume")
+MACHINE: Final = group("Machine", "--simd portable")
+OUTPUT: Final = group("Output", "--json > result.json")
+RECORD: Final = group("Records", "--rate 100")
 
 
 def option(
@@ -63,7 +73,7 @@ def flag(names: str, text: str, *, group: cloup.OptionGroup, default: bool = Fal
 def added(*options: Decorator) -> Decorator:
     """Return a decorator that adds several options, in the order of --help."""
 
-    def add(function: Command) -> Command:
+    def add(function: Function) -> Function:
         for option in reversed(options):
             function = option(function)
         return function
@@ -85,7 +95,7 @@ def _use_simd(ctx: click.Context, _: click.Parameter, value: str | None) -> None
 
 simd_option = option(
     "--simd",
-    INSTRUCTION_SET,
+    types.INSTRUCTION_SET,
     "Instruction set: avx512, avx2, sse, neon or portable.  [default: the quickest here]",
     callback=_use_simd,
     expose_value=False,
@@ -113,9 +123,11 @@ def window_options(theta: str, velocity: str) -> Decorator:
     """Return the options of a window, with the default of each axis."""
     text = "Velocities of the starts, in SI rad/s."
     return added(
-        option("--theta", AXIS, f"Angles of the starts, rad.  [default: {theta}]", group=STARTS),
-        option("--velocity", AXIS, f"{text}  [default: {velocity}]", group=STARTS),
-        option("--grid", INTEGER, "Cells on each side of the default window.", group=STARTS),
+        option(
+            "--theta", types.AXIS, f"Angles of the starts, rad.  [default: {theta}]", group=STARTS
+        ),
+        option("--velocity", types.AXIS, f"{text}  [default: {velocity}]", group=STARTS),
+        option("--grid", types.INTEGER, "Cells on each side of the default window.", group=STARTS),
     )
 
 
@@ -153,15 +165,45 @@ def output_options(
     text = f"File to write, as its suffix says: {' '.join(kinds)}; may be repeated."
     if stored:
         text += " A .zarr, also at an address like s3://, keeps tiles as they are done."
-    kind = output_or_address(*kinds) if stored else output_file(*kinds)
+    kind = types.output_or_address(*kinds) if stored else types.output_file(*kinds)
     viewed = (
-        option("--rerun", output_file(".rrd"), "Rerun recording: .rrd.", group=OUTPUT),
+        option("--rerun", types.output_file(".rrd"), "Rerun recording: .rrd.", group=OUTPUT),
         flag("--view", "Write the recording and open the viewer on it.", group=OUTPUT),
     )
     return added(
         option("--out", kind, text, multiple=True, group=OUTPUT),
-        option("--plot", output_file(*PICTURES), "Figure: .png .svg .pdf.", group=OUTPUT),
+        option("--plot", types.output_file(*PICTURES), "Figure: .png .svg .pdf.", group=OUTPUT),
         *(viewed if recording else ()),
         overwrite_option,
         printed_options(json),
     )
+
+
+def argument(
+    name: str,
+    metavar: str,
+    kind: click.ParamType[Any] | type = types.FILE,
+    **more: Any,  # noqa: ANN401 (of click)
+) -> Decorator:
+    """Return an argument, a file by default."""
+    return click.argument(name, metavar=metavar, type=kind, **more)
+
+
+class Command(cloup.Command):
+    """Command whose options stand in groups."""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:  # noqa: ANN401 (of click)
+        super().__init__(*args, **kwargs)
+        # A group is shared by commands, its options are not.
+        self.option_groups = [copy.copy(group) for group in self.option_groups]
+
+
+def new_command(
+    name: str, *examples: str, text: str | None = None
+) -> Callable[[Function], Command]:
+    """Return a decorator that makes a command; ``text`` is its help, by default the docstring."""
+    settings = cloup.Context.settings(
+        formatter_settings=cloup.HelpFormatter.settings(max_width=WIDTH, col1_max_width=28)
+    )
+    epilog = "\n".join(["\b", "Examples:", *(f"  {line}" for line in examples)])
+    return cloup.command(name, cls=Command, context_settings=settings, help=text, epilog=epilog)

@@ -10,9 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import pendmap
-from pendmap.cli.parse.groups import ACCURACY, MACHINE, RANDOM, RECORD, START
+from pendmap.cli.parse import options, types
 from pendmap.cli.parse.options import added, flag, option
-from pendmap.cli.parse.types import INTEGER, NUMBER, TEXT
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -29,15 +28,15 @@ _SENTENCE: Final = re.compile(r"(.*?)(?<!eq)\.(?: |$)")
 _OF_FLAG: Final = re.compile("^(Whether to|False:) ")
 _MARKUP: Final = re.compile(r":\w+:`~?(?:pendmap\.)?(.*?)`|``(.*?)``")
 
-_TYPES: Final = {"int": INTEGER, "float": NUMBER}
+_TYPES: Final = {"int": types.INTEGER, "float": types.NUMBER}
 """Type of an option by the first word of its annotation; other options are text."""
 _SEVERAL: Final = ("tuple[str", "Sequence", "Collection", "Iterable")
-_GROUPS: Final = {
-    **dict.fromkeys(("starts", "precision", "tol", "max_periods"), ACCURACY),
-    **dict.fromkeys(("theta", "velocity"), START),
-    "seed": RANDOM,
-    "threads": MACHINE,
-    "rate_hz": RECORD,
+GROUPS: Final = {
+    **dict.fromkeys(("starts", "precision", "tol", "max_periods"), options.ACCURACY),
+    **dict.fromkeys(("theta", "velocity"), options.START),
+    "seed": options.RANDOM,
+    "threads": options.MACHINE,
+    "rate_hz": options.RECORD,
 }
 """Group of what means the same in all commands; others have a group of their command."""
 
@@ -48,6 +47,11 @@ class Parameter(NamedTuple):
     annotation: str
     default: Any
     text: str
+
+    @property
+    def is_option(self) -> bool:
+        """Whether it is a number, a switch or a text."""
+        return self.annotation.split(" |")[0] in {"int", "float", "bool", "str"}
 
     @property
     def help(self) -> str:
@@ -119,21 +123,21 @@ def options_of(
     ``typed=parameter``. ``kinds`` are types of options that an annotation does not name.
     """
     declared = parameters(path)
-    options = []
+    made = []
     for word in names.split():
         typed, _, other = word.partition("=")
         name = other or typed
         parameter = declared[name]
         annotation = parameter.annotation.split(" |")[0]
         written = f"--{typed.replace('_', '-')} {name}"
-        kind, home = kinds.get(name, _TYPES.get(annotation, TEXT)), _GROUPS.get(name, group)
+        kind, home = kinds.get(name, _TYPES.get(annotation, types.TEXT)), GROUPS.get(name, group)
         # The default of an option must be a literal in the source.
         assert home is not None and parameter.default is not ..., name  # noqa: S101, PT018
         if annotation == "bool":
             written = f"--no-{typed} {name}" if parameter.default else written
-            options.append(flag(written, parameter.help, group=home, default=parameter.default))
+            made.append(flag(written, parameter.help, group=home, default=parameter.default))
         elif annotation.startswith(_SEVERAL):
-            options.append(option(written, kind, parameter.help, group=home, multiple=True))
+            made.append(option(written, kind, parameter.help, group=home, multiple=True))
         else:
-            options.append(option(written, kind, parameter.help, parameter.default, group=home))
-    return added(*options)
+            made.append(option(written, kind, parameter.help, parameter.default, group=home))
+    return added(*made)

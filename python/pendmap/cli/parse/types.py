@@ -92,36 +92,29 @@ class AxisText(NamedTuple):
     cells: int
 
 
-def _axis(
-    text: str,
-    meaning: str = "N cells between A and B, like -pi:pi:1000",
-    counts: str = "cells",
-    *,
-    single: bool = False,
-) -> AxisText:
-    """Read N cells between two bounds; or values, in any order, and a ``single`` one."""
-    wanted = f"must be A:B:N, {meaning}, got {text!r}"
+def _axis(text: str, *, values: bool = False) -> AxisText:
+    """Read N cells between two bounds; or N values from one bound to the other, or a single one."""
+    wanted = "N values from A to B, both included, like 0.5:2:100"
+    wanted = wanted if values else "N cells between A and B, like -pi:pi:1000"
     parts = text.split(":")
-    if len(parts) != 3:  # noqa: PLR2004
-        raise InputError(wanted)
     try:
         low, high, count = _value(parts[0]), _value(parts[1]), int(parts[2])
-    except (ValueError, ZeroDivisionError):
-        raise InputError(wanted) from None
-    if single:
+    except (ValueError, ZeroDivisionError, IndexError):
+        count = None
+    if count is None or len(parts) > 3:  # noqa: PLR2004
+        raise InputError(f"must be A:B:N, {wanted}, got {text!r}")
+    if values:
         low, high = sorted((low, high))
-    rising = low < high or (single and low == high and count <= 1)
+    rising = low < high or (values and low == high and count <= 1)
     if not (math.isfinite(low) and math.isfinite(high) and rising):
         raise InputError(f"{text!r}: the bounds must be finite, the lower one first")
     if not 1 <= count <= MOST_CELLS:
-        raise InputError(f"must have 1 to {MOST_CELLS} {counts}, got {count}: {text!r}")
+        kind = "values" if values else "cells"
+        raise InputError(f"must have 1 to {MOST_CELLS} {kind}, got {count}: {text!r}")
     return AxisText(low, high, count)
 
 
-def _range(text: str) -> AxisText:
-    """Read N values from one bound to the other, or one value with both bounds."""
-    meaning = "N values from A to B, both included, like 0.5:2:100"
-    return _axis(text, meaning, "values", single=True)
+_range = functools.partial(_axis, values=True)
 
 
 def _values(text: str) -> list[float]:
@@ -182,8 +175,12 @@ def _output(suffixes: tuple[str, ...], text: str) -> Path:
         raise InputError(f"{str(path)!r}: the folder {str(path.parent)!r} does not exist")
     if path.is_dir() and path.suffix.lower() != ".zarr":
         raise InputError(f"{str(path)!r}: is a folder")
+    _import_library(str(path), path.suffix.lower())
     try:
-        _check_library(path)
+        if path.suffix.lower() == ".zarr":
+            from pendmap.files.dataset import check_replaceable
+
+            check_replaceable(path)
         check_room(path)
     except OSError as error:
         why = error.strerror or error
@@ -194,30 +191,6 @@ def _output(suffixes: tuple[str, ...], text: str) -> Path:
 def default_file(name: str | Path) -> Path:
     """Return the path of a file that no option names; refuse it if it cannot be written."""
     return output_file(Path(name).suffix).convert(str(name), None, None)
-
-
-def _report(text: str) -> Path:
-    """Refuse a report that cannot be written: a file, or a folder, which may be missing."""
-    path, suffixes = Path(text.removeprefix("file://")), REPORTS
-    if path.suffix and not path.is_dir():
-        return _output(suffixes, text)
-    if path.exists() and not path.is_dir():
-        raise InputError(f"{str(path)!r}: must be a folder, .html or .md, it is a file")
-    if not path.parent.is_dir():
-        raise InputError(f"{str(path)!r}: the folder {str(path.parent)!r} does not exist")
-    inside = path / "report.html" if path.is_dir() else path.with_suffix(".html")
-    _output(suffixes, str(inside))
-    return path
-
-
-def _check_library(path: Path) -> None:
-    """Refuse a file that needs a library that is not installed, or a .zarr of something else."""
-    suffix = path.suffix.lower()
-    _import_library(str(path), suffix)
-    if suffix == ".zarr":
-        from pendmap.files.dataset import check_replaceable
-
-        check_replaceable(path)
 
 
 def _import_library(name: str, suffix: str) -> None:
@@ -258,9 +231,9 @@ class _File(click.Path):
 
 
 def _effects() -> Iterable[str]:
-    from pendmap.model.effects import effects
+    from pendmap.model.effects import library
 
-    return [effect.name for effect in effects()]
+    return library()
 
 
 def _methods() -> Iterable[str]:
@@ -284,4 +257,3 @@ EFFECT = OptionType("name", str, _effects)
 METHOD = OptionType("name", str, _methods)
 VALUES = OptionType("A:B:N", _values)
 INSTRUCTION_SET = OptionType("name", _instruction_set)
-REPORT = OptionType("file", _report)

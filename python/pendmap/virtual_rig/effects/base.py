@@ -57,14 +57,6 @@ class Motion:
         return (1 + self.vertical) * self.cos + (self.velocity / self.w0) ** 2
 
 
-def size(low: float, high: float, unit: str, most: float | None = None) -> Any:  # noqa: ANN401 (of a field)
-    """Describe the size of an effect, drawn log-uniformly, of absolute value at most ``most``."""
-    most = MOST * high if most is None else most
-    return dataclasses.field(
-        metadata={"low": low, "high": high, "unit": unit, "size": True, "most": most}
-    )
-
-
 def shape(  # noqa: PLR0913 (one for each thing to say about a parameter)
     low: float,
     high: float,
@@ -73,12 +65,19 @@ def shape(  # noqa: PLR0913 (one for each thing to say about a parameter)
     whole: bool = False,
     least: float | None = None,
     most: float | None = None,
+    size: bool = False,
 ) -> Any:  # noqa: ANN401 (of a field)
-    """Describe a shape parameter, drawn uniformly in [low, high] and allowed in [least, most]."""
+    """Describe a shape parameter, drawn uniformly in [low, high] and allowed in [least, most].
+
+    A size is drawn log-uniformly; whether it may be negative is said by its effect.
+    """
     most = MOST * max(abs(low), abs(high)) if most is None else most
-    least = -most if least is None else least
-    metadata = {"low": low, "high": high, "unit": unit, "whole": whole}
+    least = -most if least is None and not size else least
+    metadata = {"low": low, "high": high, "unit": unit, "whole": whole, "size": size}
     return dataclasses.field(metadata=metadata | {"least": least, "most": most})
+
+
+size: Final = functools.partial(shape, size=True)
 
 
 class Reading(NamedTuple):
@@ -103,18 +102,14 @@ class Effect:
     group: ClassVar[str]
     formula: ClassVar[str]
     variant: ClassVar[str] = ""
-    signed: ClassVar[bool] = False
-    """Whether the size may have either sign."""
-    states: ClassVar[int] = 0
-    """Number of variables that the effect integrates."""
-    drawn: ClassVar[bool] = True
-    """Whether a random draw may choose the effect."""
+    signed: ClassVar[bool] = False  # Whether the size may have either sign
+    states: ClassVar[int] = 0  # Number of variables that the effect integrates
+    drawn: ClassVar[bool] = True  # Whether a random draw may choose the effect
     needs: ClassVar[str] = ""
     """Kind of run in which the effect is observable, ``free`` or ``forced``; empty for any."""
     lowers: ClassVar[str] = ""
     """Rig parameter, ``Tr`` or ``c/m``, that the effect lowers by at most its size, or empty."""
-    order: ClassVar[int] = 0
-    """Position of a reading effect in the chain: the lowest acts first."""
+    order: ClassVar[int] = 0  # Position of a reading effect in the chain: the lowest acts first
 
     def __init_subclass__(cls) -> None:
         dataclasses.dataclass(frozen=True)(cls)
@@ -123,12 +118,14 @@ class Effect:
         for field in dataclasses.fields(self):
             about, what = field.metadata, f"effect {self.full_name()}: {field.name}"
             value = check_number(what, getattr(self, field.name))
-            least = about.get("least", -about["most"] if self.signed else 0.0)
+            least = about["least"]
+            if least is None:
+                least = -about["most"] if self.signed else 0.0
             if not least <= value <= about["most"]:
                 raise InputError(
                     f"{what} must be a number from {least:g} to {about['most']:g}, got {value:g}"
                 )
-            if about.get("whole") and value != round(value):
+            if about["whole"] and value != round(value):
                 raise InputError(f"{what} must be a whole number, got {value:g}")
             object.__setattr__(self, field.name, value)
 
@@ -152,7 +149,7 @@ class Effect:
     @classmethod
     def _draw_one(cls, rng: Generator, about: Any, scale: float) -> float:  # noqa: ANN401 (metadata)
         low, high = about["low"], about["high"]
-        if about.get("size"):
+        if about["size"]:
             sign = rng.choice((-1.0, 1.0)) if cls.signed else 1.0
             return float(sign * scale * math.exp(rng.uniform(math.log(low), math.log(high))))
         if about["whole"]:
