@@ -200,7 +200,8 @@ def command_of(name: str) -> click.Command:
 
     def run(**given: Any) -> None:  # noqa: ANN401 (the options)
         resume = bool(given.pop("resume", None))
-        chosen = {key: given.pop(key) for key in ("threads", "seed") if key in given}
+        names_of_run = ("threads", "seed")
+        chosen: dict[str, Any] = {k: given.pop(k) for k in names_of_run if k in given}
         pendulum, outputs = begin(given, name, going_on=resume)
         arguments = _arguments(name, pendulum, outputs, given)
         module = importlib.import_module(f"pendmap.analysis.{kind}")
