@@ -122,7 +122,7 @@ import xarray as xr
 from scipy.special import ellipk
 
 from pendmap.analysis import result
-from pendmap.analysis.numerics import Numerics
+from pendmap.analysis.run import Numerics
 from pendmap.analysis.result import Field, Schema, summarised
 from pendmap.files.variables import variable
 from pendmap.errors import InputError, check_number

@@ -12,9 +12,8 @@ from pendmap.analysis import result, varied
 from pendmap.analysis import sweep_table as table
 from pendmap.analysis.basins import RELIABLE, choices_of
 from pendmap.analysis.grid import Grid
-from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.result import Field, Found, Schema
-from pendmap.analysis.run import RunOptions
+from pendmap.analysis.run import Numerics, RunOptions
 from pendmap.analysis.summary import bound_said, cost, undecided
 from pendmap.analysis.sweep_tiles import PLANES, SweepTiles, branches
 from pendmap.files import facts

@@ -14,9 +14,8 @@ from pendmap.analysis.basin_tiles import BasinTiles, Starts
 from pendmap.analysis.draws import basins_over, drawn, drawn_basins
 from pendmap.analysis.fractality import fitted_map, passes_log2
 from pendmap.analysis.grid import Grid, starts
-from pendmap.analysis.numerics import Numerics, optional_whole
 from pendmap.analysis.result import Field, Found, Schema, none_below_0, summarised
-from pendmap.analysis.run import RunOptions
+from pendmap.analysis.run import Numerics, RunOptions, optional_whole
 from pendmap.analysis.summary import summary_of
 from pendmap.engine import Work
 from pendmap.errors import MOST_PERIODS, check_flag

@@ -9,10 +9,9 @@ import numpy as np
 import xarray as xr
 
 from pendmap.analysis import cell_search, result, varied
-from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.orbit_table import attractors_of, matched
 from pendmap.analysis.result import Field, Schema, point, rows
-from pendmap.analysis.run import RunOptions
+from pendmap.analysis.run import Numerics, RunOptions
 from pendmap.errors import InputError, check_number, short_repr
 from pendmap.files.variables import variable
 from pendmap.formatting import counted, span

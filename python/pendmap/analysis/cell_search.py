@@ -33,9 +33,8 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-    from pendmap.analysis.numerics import Numerics
     from pendmap.analysis.result import Schema
-    from pendmap.analysis.run import RunOptions
+    from pendmap.analysis.run import Numerics, RunOptions
     from pendmap.engine import Store, Work
     from pendmap.model import Pendulum, Rig
     from pendmap.signal import Floats

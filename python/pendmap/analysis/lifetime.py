@@ -13,10 +13,9 @@ from pendmap.analysis.basin_tiles import BasinTiles, Starts
 from pendmap.analysis.basins import choices_of, ends_of_list
 from pendmap.analysis.draws import LEVELS, drawn, drawn_field
 from pendmap.analysis.grid import FASTEST
-from pendmap.analysis.numerics import Numerics, optional_whole
 from pendmap.analysis.orbit_table import chaotic
 from pendmap.analysis.result import Field, Found, Schema
-from pendmap.analysis.run import RunOptions
+from pendmap.analysis.run import Numerics, RunOptions, optional_whole
 from pendmap.analysis.summary import effort
 from pendmap.errors import MOST_PERIODS, check_whole
 from pendmap.files import facts

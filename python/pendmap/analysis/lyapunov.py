@@ -10,9 +10,8 @@ import xarray as xr
 
 from pendmap import _core
 from pendmap.analysis import orbit_table, result
-from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.result import Field, Found, Schema, none_below_0, summarised
-from pendmap.analysis.run import RunOptions
+from pendmap.analysis.run import Numerics, RunOptions
 from pendmap.analysis.summary import effort
 from pendmap.errors import InputError, check_number, core_errors
 from pendmap.files import facts

@@ -13,8 +13,8 @@ from numpy.polynomial import legendre
 
 from pendmap import _core
 from pendmap.analysis import grid, result
-from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.result import Found, Schema, summarised
+from pendmap.analysis.run import Numerics
 from pendmap.errors import InputError, core_errors
 from pendmap.files.variables import variable
 from pendmap.model import without_dimensions

@@ -11,10 +11,9 @@ import xarray as xr
 from pendmap import _core
 from pendmap.analysis import result
 from pendmap.analysis.grid import Axis, Grid
-from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.orbit_table import objects, table
 from pendmap.analysis.result import Field, Schema, rows, summarised
-from pendmap.analysis.run import RunOptions
+from pendmap.analysis.run import Numerics, RunOptions
 from pendmap.errors import MOST_CELLS, check_type, check_whole, core_errors
 from pendmap.files import facts
 from pendmap.files.variables import flag, variable

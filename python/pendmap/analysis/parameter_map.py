@@ -12,10 +12,9 @@ import xarray as xr
 
 from pendmap.analysis import cell_search, result, varied
 from pendmap.analysis.draws import drawn, drawn_field, outcome_lines, outcomes
-from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.orbit_table import attractors_of
 from pendmap.analysis.result import Field, Schema, rows
-from pendmap.analysis.run import RunOptions
+from pendmap.analysis.run import Numerics, RunOptions
 from pendmap.analysis.tongues import tongues
 from pendmap.errors import InputError, check_flag
 from pendmap.files import facts

@@ -1,4 +1,4 @@
-"""How an analysis is computed: threads, random numbers, progress, the store of its tiles."""
+"""How an analysis is computed: options of a run, numerical choices, attributes of results."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import dataclasses
 import hashlib
 import json
 import os
+import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Final, TypedDict
 
@@ -15,16 +16,20 @@ from pendmap import _core
 from pendmap.analysis.grid import Grid
 from pendmap.engine import FileStore, Store, Work, rounding
 from pendmap.errors import (
+    MOST_PERIODS,
     MOST_SEED,
     MOST_THREADS,
     InputError,
     check_callable,
     check_flag,
+    check_number,
     check_type,
     check_whole,
+    instruction_set,
     short_repr,
 )
 from pendmap.files.dataset import reached
+from pendmap.files.variables import FORMAT_VERSION
 from pendmap.model import model_text
 
 if TYPE_CHECKING:
@@ -36,6 +41,7 @@ if TYPE_CHECKING:
 
 Progress = Callable[[int, int], object]  # Called with units of work done and in total
 
+TOL = 1e-6  # Default error of a state after 5 periods; determines the step
 _STEPS: Final = 10_000  # Number of progress steps of a part of a computation
 
 
@@ -175,6 +181,53 @@ class RunOptions:
         return result
 
 
+class Choices(TypedDict):
+    """Numerical choices as passed to the core."""
+
+    tol: float
+    max_periods: int | None
+    threads: int
+    seed: int
+
+
+@dataclasses.dataclass(frozen=True)
+class Numerics:
+    """Numerical choices of an analysis, checked on construction."""
+
+    run: RunOptions = dataclasses.field(default_factory=RunOptions)
+    tol: float = TOL
+    max_periods: int | None = None
+    began: float = dataclasses.field(default_factory=time.perf_counter, init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "tol", check_number("tol", self.tol))
+        bound = optional_whole("max_periods", self.max_periods, 1, MOST_PERIODS)
+        object.__setattr__(self, "max_periods", bound)
+
+    @property
+    def request(self) -> dict[str, Any]:
+        """The choices that determine numbers of a result."""
+        return {"tol": self.tol, "max_periods": self.max_periods, "seed": self.run.seed}
+
+    @property
+    def core(self) -> Choices:
+        """The choices as passed to the core."""
+        bound, seed = self.max_periods, self.run.seed
+        return {"tol": self.tol, "max_periods": bound, "threads": self.run.workers, "seed": seed}
+
+    def provenance(self) -> dict[str, Any]:
+        """Return attributes on how a result was computed, with the time since ``began``."""
+        return {
+            "tol": self.tol,
+            "seconds": time.perf_counter() - self.began,
+            "simd": instruction_set(),
+            "threads": self.run.here,
+            "seed": self.run.seed,
+            "pendmap_version": _core.__version__,
+            "format_version": FORMAT_VERSION,
+        }
+
+
 def _address(store: str | os.PathLike[str]) -> str:
     """Return the address of a store; a folder must be named like one."""
     name = os.fspath(store) if isinstance(store, str | os.PathLike) else ""
@@ -236,3 +289,8 @@ def in_rounds(progress: Progress | None, typical: int) -> Progress | None:
         progress(round(_STEPS * passed / (passed + typical)), _STEPS)
 
     return report
+
+
+def optional_whole(name: str, value: int | None, least: int, most: int) -> int | None:
+    """Return a whole number between two bounds, or None if none is given."""
+    return None if value is None else check_whole(name, value, least, most)

@@ -22,9 +22,8 @@ import xarray as xr
 
 from pendmap import _core
 from pendmap.analysis import grid, result
-from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.result import Field, Found, Schema, summarised
-from pendmap.analysis.run import RunOptions, in_rounds
+from pendmap.analysis.run import Numerics, RunOptions, in_rounds
 from pendmap.analysis.varied import title_without
 from pendmap.errors import InputError, check_flag, check_number, core_errors, short_repr
 from pendmap.files import facts

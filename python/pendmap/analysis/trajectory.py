@@ -10,9 +10,8 @@ import xarray as xr
 
 from pendmap import _core, errors
 from pendmap.analysis import grid, result
-from pendmap.analysis.numerics import Numerics
 from pendmap.analysis.result import Field, Found, Schema, summarised
-from pendmap.analysis.run import RunOptions
+from pendmap.analysis.run import Numerics, RunOptions
 from pendmap.files import facts
 from pendmap.files.variables import variable
 from pendmap.formatting import counted, with_error

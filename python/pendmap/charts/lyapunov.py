@@ -47,12 +47,6 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     ).only(layer, (_WIDTHS[1], 4.3))
 
 
-def _clock(dataset: xr.Dataset, name: str) -> Axis:
-    """Return the axis of the periods elapsed."""
-    first, last = dataset["elapsed"].values[[0, -1]]
-    return Axis(f"periods since the start{name}", (float(first), float(max(last, first + 1))))
-
-
 def _rate(dataset: xr.Dataset) -> str:
     return f"λ ({names.per_time(Units.of(facts(dataset)))})"
 
@@ -90,7 +84,9 @@ def _growth(dataset: xr.Dataset) -> Panel:
         marks.append(Line(periods[begin:], line, **_mean_look(dataset)))
     up = Axis("ln |δx|", holding(growth, 0.0))
     title = "growth along the start's own trajectory"
-    return Panel("growth", title, _clock(dataset, ""), up, marks)
+    first, last = dataset["elapsed"].values[[0, -1]].tolist()
+    clock = Axis("periods since the start", (first, max(last, first + 1)))
+    return Panel("growth", title, clock, up, marks)
 
 
 def _average(dataset: xr.Dataset) -> Panel:

@@ -190,9 +190,11 @@ def _periods(work: Work) -> Periods | None:
 def radians(work: Work) -> Finding | None:
     """Convert degrees to radians where the swings are impossible otherwise."""
     periods = _periods(work)
-    if periods is None or not _impossible(periods):
+    if periods is None or np.median(periods.amplitude) <= 0:
         return None
     largest = float(np.max(periods.amplitude))
+    if largest <= math.pi:  # swings are possible
+        return None
     if largest * DEGREE > math.pi or _channel(work) in work.declared:
         return work.finding("angle-unit.wrong", largest=largest)
     work.theta *= DEGREE
@@ -202,11 +204,6 @@ def radians(work: Work) -> Finding | None:
     work.estimated_step *= DEGREE
     read = "velocities are degrees a second" if work.integrated else "angles are degrees"
     return work.finding("angle-unit.degrees", read=read, largest=largest)
-
-
-def _impossible(periods: Periods) -> bool:
-    """Return whether swings are larger than half a turn."""
-    return float(np.max(periods.amplitude)) > math.pi and float(np.median(periods.amplitude)) > 0
 
 
 def _channel(work: Work) -> str:
