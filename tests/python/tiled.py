@@ -15,7 +15,6 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 import fsspec
-import numpy as np
 import pytest
 import xarray as xr
 
@@ -31,7 +30,6 @@ _DRY = Pendulum(gamma=0.05, theta_r=0.05, p=1.1, omega=1.9)
 _SLOW = Pendulum(gamma=0.03, p=0.5, omega=2.6)  # A further search finds attractors
 _WINDOW = {"p": (0.2, 2.0, 20), "omega": (1.5, 2.2, 18)}
 _SMALL = {"p": (0.4, 0.9, 9), "omega": (1.8, 2.2, 9)}
-_STARTS = np.random.default_rng(1).uniform(-3, 3, (2, 1500))
 _CHANGES = ("seconds", "summary", "threads", "history")  # Attributes of how, not of what
 
 CASES: dict[str, Callable[..., xr.Dataset]] = {
@@ -43,7 +41,6 @@ CASES: dict[str, Callable[..., xr.Dataset]] = {
     "plane": functools.partial(pendmap.sweep, Pendulum(), _SMALL, grid=10),
     "bifurcation": functools.partial(pendmap.bifurcation, Pendulum(), {"p": (0.2, 2.0, 40)}),
     "lifetime": functools.partial(pendmap.lifetime, Pendulum(p=1.7), starts=4000),
-    "list": functools.partial(pendmap.lifetime, Pendulum(p=1.7), *_STARTS),
 }
 """Analyses that are computed in tiles."""
 

@@ -65,9 +65,11 @@ def sweep_dataset(  # noqa: PLR0913, PLR0917 (the parts of a sweep)
     variables["plane"] = flag(dims, np.reshape(plane, shape), shows, planes)
     table = _table(maps, numbers, axes, grid.cells, units)
     names = table["attractor"][1].tolist()
-    variables["label"] = result.labels((*dims, "velocity", "theta"), label, names)
+    labels = {"label": result.labels((*dims, "velocity", "theta"), label, names)}
     coordinates = {name: one for axis in axes for name, one in axis.coordinates.items()}
-    return xr.Dataset({**variables, **table}, coords=coordinates | grid.coordinates(units))
+    return xr.Dataset(
+        {**labels, **variables, **table}, coords=coordinates | grid.coordinates(units)
+    )
 
 
 def _table(

@@ -263,8 +263,8 @@ def _samples(
         samples = max(samples, int(min(smooth, _SMOOTH_SAMPLES // periods)) // count)
     samples = errors.check_whole("samples", samples, 1, errors.MOST_SAMPLES)
     if periods * samples * count > 100 * _MOST_SAMPLES:
-        text = f"{periods:.3g} periods of {samples} samples do not fit into memory"
-        raise errors.InputError(f"until must be shorter: {text}")
+        most = f"{100 * _MOST_SAMPLES // samples // count:.3g} periods of {samples} samples"
+        raise errors.InputError(f"until must be up to {most}, got {periods:.3g}: memory ends")
     return samples
 
 

@@ -102,9 +102,13 @@ def varied(
     curves = _curves(ranges, count)
     if len(curves) != count:
         given = ", ".join(map(str, ranges)) if isinstance(ranges, Mapping) else short_repr(ranges)
+        second, more = (
+            (", 'omega': (0.5, 3.0, 100)", " --omega 0.5:3:100") if count > 1 else ("", "")
+        )
         raise InputError(
-            f"ranges must be a mapping of {count} like {{'p': (0.5, 2.0, 100)}}, or on the command "
-            f"line --p 0.5:2:100; got {given or 'nothing'}"
+            f"ranges must be a mapping like {{'p': (0.5, 2.0, 100){second}}}, or on the command "
+            f"line --p 0.5:2:100{more}; "
+            f"got {given or 'nothing'}"
         )
     axes = tuple(_axis(model, curve) for curve in curves)
     every = _every(axes)

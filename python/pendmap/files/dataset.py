@@ -16,7 +16,6 @@ import os
 import re
 import threading
 import time
-import warnings
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any, Final
 
@@ -254,13 +253,16 @@ def _fill(dataset: xr.Dataset, address: Address, request: object) -> None:
     dataset, encoding = stored_form(dataset)
     texts = [name for name, values in dataset.variables.items() if values.dtype.kind == "U"]
     dataset = dataset.assign({n: dataset[n].astype(np.dtypes.StringDType()) for n in texts})
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message="Consolidated metadata")
-        form: Any = {"zarr_format": 3, "consolidated": True, "write_empty_chunks": True}
-        dataset.to_zarr(address, encoding=encoding, **form)
+    form: Any = {"zarr_format": 3, "consolidated": False, "write_empty_chunks": True}
+    dataset.to_zarr(address, encoding=encoding, **form)
     system, path = place(address)
     names = {name.removeprefix(path).lstrip("/"): name for name in system.find(path)}
     read = system.cat_file
+    # The root also has the metadata of all arrays, where other tools look first.
+    arrays = {key[:-10]: json.loads(read(names[key])) for key in names if key[-10:] == "/zarr.json"}
+    root = json.loads(read(names["zarr.json"]))
+    root["consolidated_metadata"] = {"kind": "inline", "must_understand": False, "metadata": arrays}
+    system.pipe_file(names["zarr.json"], json.dumps(root).encode())
     files = {key: hashlib.sha256(read(name)).hexdigest() for key, name in names.items()}
     seal = json.dumps({"request": request, "files": files}, indent=1)
     system.pipe_file(f"{path}/{_SEAL}", seal.encode())

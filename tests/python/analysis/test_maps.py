@@ -79,7 +79,7 @@ def test_a_list_of_starts_gives_the_labels_of_the_grid(smooth: Any) -> None:  # 
     assert np.array_equal(listed.label.values, smooth.label.values.ravel())
 
 
-@pytest.mark.parametrize("name", ["basins", "chaos", "slow", "list"])
+@pytest.mark.parametrize("name", ["basins", "chaos", "slow", "lifetime"])
 def test_no_result_depends_on_the_size_of_tiles(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = tiled.case(name)
     monkeypatch.setattr("pendmap.analysis.basin_tiles.TILE", tiled.TILE)

@@ -169,19 +169,14 @@ def test_effects_are_named_with_units() -> None:
 
 
 @pytest.mark.parametrize(
-    ("model", "own", "said"),
-    [
-        (Rig(w0=6.2, c_over_m=0.5), "2π/w0", "a period is 2 pi / w0 = 1.013 s"),
-        (Pendulum(p=0), "2π", "a period is 2 pi)"),
-    ],
+    ("model", "own"), [(Rig(w0=6.2, c_over_m=0.5), "2π/w0"), (Pendulum(p=0), "2π")]
 )
 def test_periods_without_drive_are_given_in_the_units_of_the_map(
-    model: Rig | Pendulum, own: str, said: str
+    model: Rig | Pendulum, own: str
 ) -> None:
     result = pendmap.basins(model, Grid.square(8))
     unit = basins.text_of(result, basins.LAYERS["settle"].unit)
     assert unit == f"periods of {own} to settle"
-    assert said in result.attrs["summary"]
     assert "forcing" not in result.settle_periods.attrs["long_name"]
 
 

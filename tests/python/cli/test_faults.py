@@ -56,7 +56,7 @@ def test_a_full_disk_is_reported_on_one_line(tmp_path: Path) -> None:
     assert run.returncode == 1
     missed = "; ".join(f"cannot write {file}: File too large" for file in files)
     assert run.stderr.splitlines() == [f"pendmap: {missed}; written: nothing"]
-    assert "basin stability" in run.stdout
+    assert "oscillation 2:0" in run.stdout
     assert list(tmp_path.iterdir()) == []
 
 

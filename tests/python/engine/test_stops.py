@@ -38,7 +38,7 @@ KILLED = [
     *(
         pytest.param(name, kills, marks=pytest.mark.thorough)
         for name, kills in {
-            **dict.fromkeys(("chaos", "slow", "bifurcation", "lifetime", "list", "sweep"), 5),
+            **dict.fromkeys(("chaos", "slow", "bifurcation", "lifetime", "sweep"), 5),
             "map": 50,
         }.items()
     ),

@@ -37,9 +37,9 @@ RESULTS: dict[str, Callable[[], xr.Dataset]] = {
     "lifetime": lambda: pendmap.lifetime(DRAWN, starts=100, draws=2),
     "lyapunov": lambda: pendmap.lyapunov(SI),
     "melnikov": lambda: pendmap.melnikov(BARE, [1.0, 2.0]),
-    "orbits": lambda: pendmap.orbit(DRAWN, 1, 1, Grid.square(20, 6.2), draws=2),
+    "orbits": lambda: pendmap.orbit(DRAWN, 1, 1, Grid.square(20, 6.2)),
     "parameter_map": lambda: pendmap.parameter_map(DRAWN, PLANE, starts=2, draws=2, curves=True),
-    "tongues": lambda: pendmap.tongues(DRAWN, [1.9, 2.0], draws=2),
+    "tongues": lambda: pendmap.tongues(DRAWN, [1.9, 2.0]),
     "trajectory": lambda: pendmap.simulate(SI, 1.0, 0.0, 3.0, lyapunov=True),
 }
 UNITS = {"1", "rad", "rad/s", "rad/s2", "1/s", "1/rad", "s", "m/s2", "mm"}

@@ -13,12 +13,12 @@ import pytest
 
 import pendmap
 from decays import decay, record
+from fits import trajectory_of
 from pendmap.comparison import compare
 from pendmap.comparison.data import split_records
 from pendmap.comparison.experiment import as_json as compared
 from pendmap.errors import InputError
 from pendmap.identification import identified_model, identify
-from pendmap.identification.methods import trajectory
 from pendmap.identification.readings import as_fit_run, reading_of
 from pendmap.identification.report import as_json, as_text
 from pendmap.records import Experiment, Finding, Run
@@ -237,7 +237,7 @@ def test_a_fit_after_a_hold_has_residuals_of_noise_alone(
     tmp_path: Path, angle: float, hold: float
 ) -> None:
     run, _ = held(tmp_path, angle, hold, 0.1, 4)
-    fit = trajectory.identify(run.time, run.theta, trusted=run.trusted)
+    fit = trajectory_of(run.time, run.theta, trusted=run.trusted)
     assert fit.misfit == pytest.approx(1.0, abs=0.15)
     assert not any("does not fit" in warning for warning in fit.warnings)
     w0 = fit.estimates["w0"]
