@@ -28,7 +28,8 @@ from pendmap.identification.period import mean_period
 from pendmap.identification.table1 import State, peak_errors
 from pendmap.virtual_rig.effects.base import Drive
 from pendmap.virtual_rig.equation import Equation, Parameters
-from pendmap.virtual_rig.integrator import Starts, integrate
+from pendmap.virtual_rig.integrator import integrate
+from pendmap.virtual_rig.lanes import Starts
 from pendmap.virtual_rig.sensor import Sensor
 
 if TYPE_CHECKING:
