@@ -108,7 +108,7 @@ class _Commands(click.Group):
             option = options[named["name"]]
             raise click.UsageError(f"Invalid value for '{option}': {named['rest']}") from error
 
-    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         for title, commands in _SECTIONS.items():
             with formatter.section(title):
                 formatter.write_dl([*commands.items()], col_max=12)

@@ -357,13 +357,13 @@ def _refers(data: mmap.mmap) -> bool:
         place = int.from_bytes(data[at : at + 8], "little")
         return place < len(data) and data[place : place + 4] == target
 
-    sizes, base = (13, 28 if data[8] else 24) if data[8] < 2 else (9, 12)  # noqa: PLR2004 (places)
-    if data[sizes] != 8 or data[base : base + 8] != bytes(8):  # noqa: PLR2004 (bytes of an address)
+    sizes, base = (13, 28 if data[8] else 24) if data[8] < 2 else (9, 12)
+    if data[sizes] != 8 or data[base : base + 8] != bytes(8):
         return True  # no library writes such files unasked, and addresses would be others
     storage = (
         leads(hit.end() + 4, b"HEAP")
         for hit in _STORAGE.finditer(data)
-        if any(data[max(hit.start() - before, 0)] == 7 for before in _STORAGE_TYPES)  # noqa: PLR2004
+        if any(data[max(hit.start() - before, 0)] == 7 for before in _STORAGE_TYPES)
     )
     virtual = (leads(hit.end(), b"GCOL") for hit in _VIRTUAL.finditer(data))
     links = (_is_link(data, hit.end(), hit[1][0]) for hit in _LINK.finditer(data))
@@ -377,4 +377,4 @@ def _is_link(data: mmap.mmap, place: int, flags: int) -> bool:
     place += size + int.from_bytes(data[place : place + size], "little")
     value = int.from_bytes(data[place : place + 2], "little")
     names = data[place + 2 : place + 2 + value]
-    return len(names) == value > 3 and names.count(0) == 3 and names[0] == names[-1] == 0  # noqa: PLR2004
+    return len(names) == value > 3 and names.count(0) == 3 and names[0] == names[-1] == 0

@@ -147,7 +147,7 @@ class Effect:
         return cls(**(values | given))
 
     @classmethod
-    def _draw_one(cls, rng: Generator, about: Any, scale: float) -> float:  # noqa: ANN401 (metadata)
+    def _draw_one(cls, rng: Generator, about: Any, scale: float) -> float:  # noqa: ANN401 (data)
         low, high = about["low"], about["high"]
         if about["size"]:
             sign = rng.choice((-1.0, 1.0)) if cls.signed else 1.0
