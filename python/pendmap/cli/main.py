@@ -65,7 +65,7 @@ class _ReaderGone(Exception):  # noqa: N818 (nothing is wrong)
 class _Commands(click.Group):
     """Group whose commands are imported only when called: ``--help`` imports none of them."""
 
-    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
+    def list_commands(self, ctx: click.Context) -> list[str]:
         return _COMMANDS
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
