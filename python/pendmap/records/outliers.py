@@ -34,7 +34,6 @@ SCALE_SAMPLES: Final = 151  # Samples from which the local standard deviation is
 PASSES: Final = 8  # Most searches for outliers; each may reveal one next to another
 MOST_OUTLIERS: Final = 0.1  # Greatest share of outliers; with more, no sample is marked
 SIDE: Final = 10  # Samples on each side from which a sample is judged
-GAP: Final = 4.0  # Gap, intervals, that windows do not cross
 MOST_TOGETHER: Final = 6  # Most neighbouring outliers that are distinguished from the motion
 WEIGHT_STEPS: Final = 10  # Iterations of the weights of least absolute deviations
 CERTAIN_JUMP: Final = 7.0  # Standard errors above which a step is a jump
@@ -42,6 +41,10 @@ OFF_COUNT: Final = 0.25  # Greatest deviation of a corrected jump from whole cou
 MOST_JUMPS: Final = 20  # Most jumps that are corrected
 OFF_TURN: Final = 0.1  # Greatest deviation of a jump from whole turns, rad
 OTHER_RECORD: Final = 0.5  # Size of a jump, rad, above which a second recording may begin
+END_SAMPLES: Final = 10  # Samples of each end that are compared with predictions
+END_GAP: Final = POINTS // 2  # Longest gap, intervals, that windows cross
+PREDICTIONS: Final = 40  # Predictions further inside that give the usual error
+END_DEGREES: Final = (2, 3)  # Degrees of the predicting polynomials
 
 
 def outliers(work: Work) -> Finding | None:
@@ -69,9 +72,7 @@ def outliers(work: Work) -> Finding | None:
                 jumps.append(jump)
                 theta[jump.at :] -= jump.size
         _bridge(work.time, theta, false)
-    for end in _ends(work.time):  # windows end before them
-        away = np.abs(_smooth(work.time[end] - work.time[end[0]], theta[end]))
-        false[end] |= ~corner[end] & (away > SUSPECT * normal_scale(away) + 2 * work.count)
+    false |= ~corner & false_ends(work.time, theta, ~(bad | false), SUSPECT, work.count)
     _bridge(work.time, theta, false)
     work.jumps = sorted(jumps, key=lambda jump: jump.at)
     moved = np.zeros(theta.size)
@@ -79,14 +80,6 @@ def outliers(work: Work) -> Finding | None:
         moved[jump.at :] += jump.size
     work.bridged = theta + moved
     return _distrust(work, np.flatnonzero(false & work.trusted), work.theta - moved - theta, "rad")
-
-
-def _ends(time: Floats) -> list[Indices]:
-    """Return the samples at the ends of a record and of its gaps."""
-    steps = np.diff(time)
-    pieces = np.split(np.arange(time.size), np.flatnonzero(steps > GAP * np.median(steps)) + 1)
-    long = [piece for piece in pieces if piece.size >= 2 * SIDE]
-    return [end for piece in long for end in (piece[: 2 * SIDE], piece[-2 * SIDE :])]
 
 
 def _distrust(work: Work, at: Indices, away: Floats, unit: str) -> Finding | None:
@@ -285,3 +278,46 @@ def spikes(work: Work) -> Finding | None:
 def integrate_again(work: Work) -> None:
     """Integrate a rate without the readings that are marked."""
     work.theta = angle_of_rate(work.time, work.extra["velocity"], work.trusted)
+
+
+def false_ends(time: Floats, theta: Floats, trusted: Mask, limit: float, count: float) -> Mask:
+    """Return the mask of outliers at ends and gaps; ``limit`` is in usual errors of prediction."""
+    false = np.zeros(theta.size, bool)
+    good = np.flatnonzero(trusted)
+    if good.size < 2:
+        return false
+    interval = float(np.median(np.diff(time[good])))
+    cuts = np.flatnonzero(np.diff(time[good]) > END_GAP * interval) + 1
+    near = END_SAMPLES + PREDICTIONS + POINTS
+    for piece in np.split(good, cuts):
+        if piece.size < near:
+            continue
+        for end in (piece[:near], piece[:-near:-1]):
+            lag = (time[end] - time[end[0]]) / interval
+            false[end[:END_SAMPLES]] |= _missed_at_end(lag, theta[end].copy(), limit, count)
+    return false
+
+
+def _missed_at_end(lag: Floats, theta: Floats, limit: float, count: float) -> Mask:
+    """Return the mask of outliers among the first readings, tested from the inside outward."""
+    inner = np.arange(END_SAMPLES, lag.size - POINTS)
+    tried = {
+        degree: normal_scale(theta[inner] - _before(lag, theta, inner, degree))
+        for degree in END_DEGREES
+    }
+    degree = min(tried, key=tried.__getitem__)
+    missed = np.zeros(END_SAMPLES, bool)
+    for k in range(END_SAMPLES - 1, -1, -1):
+        there = float(_before(lag, theta, np.array([k]), degree)[0])
+        if abs(theta[k] - there) > limit * tried[degree] + 2 * count:
+            missed[k] = True
+            theta[k] = there
+    return missed
+
+
+def _before(lag: Floats, theta: Floats, places: Indices, degree: int) -> Floats:
+    """Return predictions from polynomials fitted to the nine samples after each index."""
+    behind = places[:, None] + np.arange(1, POINTS + 1)
+    x = lag[behind] - lag[places, None]
+    powers = (x / x[:, -1:])[:, :, None] ** np.arange(degree + 1)
+    return np.asarray(np.einsum("mp,mp->m", np.linalg.pinv(powers)[:, 0, :], theta[behind]))
