@@ -264,7 +264,7 @@ def _samples(
     samples = errors.check_whole("samples", samples, 1, errors.MOST_SAMPLES)
     if periods * samples * count > 100 * _MOST_SAMPLES:
         most = f"{100 * _MOST_SAMPLES // samples // count:.3g} periods of {samples} samples"
-        raise errors.InputError(f"until must be up to {most}, got {periods:.3g}: memory ends")
+        raise errors.InputError(f"until must be up to {most}, got {periods:.3g}: more do not fit")
     return samples
 
 

@@ -83,7 +83,7 @@ def test_basins_takes_whole_numbers_of_numpy() -> None:
         ({"until": None}, "until must be .*, got None"),
         (
             {"until": 1e12},
-            r"until must be up to \d.* periods of 1 samples, got 3.18e\+11: memory ends",
+            r"until must be up to \d.* periods of 1 samples, got 3.18e\+11: more do not fit",
         ),
         ({"samples": 2.5}, "samples must be .*, got 2.5"),
         ({"lyapunov": 1}, "lyapunov must be .*, got 1"),
