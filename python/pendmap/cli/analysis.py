@@ -199,10 +199,9 @@ def command_of(name: str) -> click.Command:
     declared = parameters(path)
 
     def run(**given: Any) -> None:  # noqa: ANN401 (the options)
-        resume = bool(given.pop("resume", None))
-        names_of_run = ("threads", "seed")
-        chosen: dict[str, Any] = {k: given.pop(k) for k in names_of_run if k in given}
-        pendulum, outputs = begin(given, name, going_on=resume)
+        names = [key for key in ("threads", "seed", "resume") if key in given]
+        options: dict[str, Any] = {key: given.pop(key) for key in names}
+        pendulum, outputs = begin(given, name, going_on=options.get("resume", False))
         arguments = _arguments(name, pendulum, outputs, given)
         module = importlib.import_module(f"pendmap.analysis.{kind}")
         store = outputs.store if entry.stored else None
@@ -212,13 +211,7 @@ def command_of(name: str) -> click.Command:
             if "run" in declared:
                 from pendmap.analysis.run import RunOptions
 
-                run_options: dict[str, Any] = {
-                    "progress": progress,
-                    "store": store,
-                    "resume": resume,
-                    **chosen,
-                }
-                arguments["run"] = RunOptions(**run_options)
+                arguments["run"] = RunOptions(progress=progress, store=store, **options)
             dataset = getattr(module, function)(pendulum, **arguments)
         try:
             if arguments.get("live"):
