@@ -2,7 +2,7 @@
 
 use std::sync::atomic::AtomicBool;
 
-use super::find::{Catalogue, REACH, SAME};
+use super::find::{Catalogue, REACH};
 use crate::error::Error;
 use crate::integrate::{State, Strobe};
 use crate::orbit::PoincareMap;
@@ -90,6 +90,6 @@ impl Catalogue {
     /// Whether this orbit is one of those found, or of those without a trap.
     fn knows(&self, orbit: &PeriodicOrbit) -> bool {
         let found = self.orbits.iter().map(|(o, _)| o);
-        found.chain(&self.untrapped).any(|o| o.contains(orbit.points[0], SAME))
+        found.chain(&self.untrapped).any(|o| o.is_same(orbit))
     }
 }

@@ -12,6 +12,7 @@ use super::region::Region;
 use crate::integrate::State;
 use crate::model::{Angle, Pendulum};
 use crate::orbit::PeriodicOrbit;
+use crate::orbit::newton::SAME;
 use crate::orbit::rotation::Rotation;
 use crate::orbit::symmetry::Mirror;
 
@@ -160,6 +161,12 @@ impl Attractor {
     #[must_use]
     pub fn passes(&self, state: State, tolerance: f64) -> bool {
         self.points.iter().any(|p| self.angle.distance(*p, state) < tolerance)
+    }
+
+    /// Whether it is the orbit of these points.
+    #[must_use]
+    pub fn is_orbit(&self, points: &[State]) -> bool {
+        self.n.is_some() && self.passes(points[0], SAME)
     }
 
     /// A key independent of the order of the catalogue: the bits of the first point.

@@ -20,6 +20,7 @@ use crate::error::{Error, unless_cancelled};
 use crate::integrate::{State, Strobe, TangentStates};
 use crate::model::Angle;
 use crate::orbit::PoincareMap;
+use crate::orbit::newton::SAME;
 
 /// Number of stroboscopic points stored as a sample of the set.
 const KEPT: usize = 2000;
@@ -35,8 +36,6 @@ const SIGNIFICANCE: f64 = 4.0;
 const MORE: usize = 4;
 /// Least exponent, per period, that is accepted as positive.
 const LEAST_EXPONENT: f64 = 1e-3;
-/// Distance within which points are identical.
-const SAME: f64 = 1e-6;
 /// Exponents (per period) within this of zero may belong to quasi-periodic motion.
 const NEUTRAL: f64 = 2e-3;
 /// Least number of turns of such motion, per period.

@@ -24,8 +24,6 @@ use crate::progress::Progress;
 
 /// Largest distance of Newton's method from the trajectory's state.
 pub(super) const REACH: f64 = 0.3;
-/// Distance within which points belong to one orbit.
-pub(super) const SAME: f64 = 1e-6;
 /// Periods between two reports of progress.
 const STRETCH: u32 = 4096;
 /// Most starts settle within this part of a search's bound: in which damping shrinks a free motion by `exp(-10)`.
@@ -334,7 +332,7 @@ impl Catalogue {
         }
         let mut traps = own.clone();
         let image = Mirror::of(&strobe.pendulum).and_then(|mirror| mirror.orbit(map, &orbit));
-        if let Some((image, moved)) = image.filter(|(i, _)| !orbit.contains(i.points[0], SAME)) {
+        if let Some((image, moved)) = image.filter(|(i, _)| !orbit.is_same(i)) {
             let twins = match moved {
                 Some(moved) => trap::mirrored(&own, moved),
                 None => ellipses(strobe, &image, &self.effort.trap, cancel)?,

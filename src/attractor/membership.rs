@@ -4,7 +4,7 @@ use std::sync::atomic::AtomicBool;
 
 use super::capture::Traps;
 use super::catalogue::Attractor;
-use super::find::{Catalogue, Ending, REACH, SAME, open};
+use super::find::{Catalogue, Ending, REACH, open};
 use super::long_runs::{Window, WindowPlan, long_runs};
 use super::near_returns::{nearest_return, tracks};
 use crate::error::Error;
@@ -54,11 +54,8 @@ impl Catalogue {
     ) -> Result<Vec<Option<usize>>, Error> {
         let map = self.effort.map(strobe);
         let longest = self.effort.longest_cycle;
-        let own = |orbit: PeriodicOrbit| {
-            let passes =
-                |a: &Attractor| a.n.is_some() && a.points.iter().any(|p| orbit.contains(*p, SAME));
-            self.attractors.iter().position(passes)
-        };
+        let own =
+            |orbit: PeriodicOrbit| self.attractors.iter().position(|a| a.is_orbit(&orbit.points));
         let tracks = tracks(strobe, states, longest);
         let mut places = self.chaos_of(strobe, states, cancel)?;
         let nearest = |track: &Vec<State>| nearest_return(strobe.angle, track, longest);

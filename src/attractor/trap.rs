@@ -14,13 +14,13 @@ use nalgebra::{Matrix2, Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::effort::Sampling;
-use super::find::SAME;
 use super::gauge::Gauge;
 use crate::error::{Error, unless_cancelled};
 use crate::integrate::accuracy::wrapped;
 use crate::integrate::{State, States, Strobe};
 use crate::model::Angle;
 use crate::orbit::PeriodicOrbit;
+use crate::orbit::newton::SAME;
 
 /// An ellipse around one point of an attractor: inside where `y1^2 + y2^2 < 1`.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]

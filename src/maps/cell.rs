@@ -12,12 +12,9 @@ use crate::attractor::{Attractor, Catalogue, Effort, Ending, Kind};
 use crate::error::Error;
 use crate::integrate::{State, Strobe};
 use crate::orbit::PoincareMap;
-use crate::orbit::newton::PeriodicOrbit;
 
 /// Largest distance between points of corresponding orbits of similar pendulums.
 pub(super) const LIKE: f64 = 0.25;
-/// Distance within which points belong to one orbit.
-const SAME: f64 = 1e-6;
 /// Largest number of hints of a search.
 const MOST_HINTS: usize = 16;
 /// Points of a non-periodic attractor in a hint: after a small change one alone may be off it.
@@ -138,13 +135,10 @@ impl Search {
         if !gained && (ended || joined) {
             return Ok(None);
         }
-        let same = |old: &Attractor, new: &Attractor| {
-            old.n.is_some() && old.kind == new.kind && new.passes(old.points[0], SAME)
-        };
         let ending = |(end, start): (&End, State)| match end {
             End::Captured(old) => {
                 let old = &cell.found[*old].attractor;
-                let new = catalogue.attractors.iter().find(|new| same(old, new));
+                let new = catalogue.attractors.iter().find(|new| new.is_orbit(&old.points));
                 new.map_or(Ending::Open(start), |new| Ending::Captured(new.mark()))
             }
             End::Open(state) => Ending::Open(*state),
@@ -190,16 +184,12 @@ impl Search {
             return hints;
         }
         let map = PoincareMap::of_steps(strobe);
-        let has = |orbit: &PeriodicOrbit| {
-            let own = |p: &State| orbit.contains(*p, SAME);
-            let attractors = cell.found.iter().map(|f| &f.attractor);
-            attractors.filter(|a| a.n.is_some()).any(|a| a.points.iter().any(own))
-        };
+        let has = |points: &[State]| cell.found.iter().any(|f| f.attractor.is_orbit(points));
         let mut orbits = attracting(strobe, &map, &cycles(&hints)).into_iter();
         let promises = |hint: &Hint| {
             let Some(n) = hint.n else { return beside };
             match orbits.next().flatten() {
-                Some(orbit) => !has(&orbit),
+                Some(orbit) => !has(&orbit.points),
                 None => beside && !cell.has(n, hint.w),
             }
         };

@@ -14,6 +14,7 @@ use super::tongues::{Balance, Curve, bordered, gap, is_stable, under};
 use crate::integrate::State;
 use crate::model::Pendulum;
 use crate::orbit::PoincareMap;
+use crate::orbit::newton::SAME;
 
 /// Newton's steps onto the orbit, and the gap at which it has converged, in units of the rounding
 /// error.
@@ -39,8 +40,6 @@ const DOUBLED: f64 = 1e-6;
 /// Refinements of a zero at most, and the last one's size in parts of `1 + p`.
 const REFINEMENTS: usize = 40;
 const EXACT: f64 = 1e-12;
-/// Distance at one `p` within which orbits are identical.
-const SAME: f64 = 1e-6;
 
 /// The orbit at one `p`.
 #[derive(Clone, Copy, Debug)]

@@ -35,8 +35,6 @@ const ERROR_SAMPLE: usize = 200;
 const REACH_CELLS: f64 = 8.0;
 /// Least value of that distance.
 const LEAST_REACH: f64 = 0.3;
-/// Distance within which points belong to one orbit.
-const SAME: f64 = 1e-6;
 /// With friction, speeds below this are zero.
 const STILL: f64 = 1e-9;
 /// A multiplier this near to 1 is set to it.
@@ -145,7 +143,7 @@ pub fn orbits(pendulum: &Pendulum, request: &Request, control: &Control) -> Resu
             }
             let image = mirror.as_ref().and_then(|m| Some(m.orbit(&map, &orbit)?.0));
             for one in std::iter::once(orbit).chain(image) {
-                if !all.iter().any(|other| other.contains(one.points[0], SAME)) {
+                if !all.iter().any(|other| other.is_same(&one)) {
                     all.push(one);
                 }
             }

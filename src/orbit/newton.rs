@@ -22,6 +22,8 @@ const ITERATIONS: usize = 16;
 const PROMISING: usize = 5;
 /// Points closer than this are one point of the orbit.
 const SAME_POINT: f64 = 1e-8;
+/// Distance within which points belong to one orbit.
+pub const SAME: f64 = 1e-6;
 
 /// A periodic orbit of the stroboscopic map.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -70,6 +72,12 @@ impl PeriodicOrbit {
     #[must_use]
     pub fn contains(&self, state: State, tolerance: f64) -> bool {
         self.points.iter().any(|p| self.angle.distance(*p, state) < tolerance)
+    }
+
+    /// Whether the other is this orbit: its first point is one of the points of this one.
+    #[must_use]
+    pub fn is_same(&self, other: &Self) -> bool {
+        self.contains(other.points[0], SAME)
     }
 }
 
