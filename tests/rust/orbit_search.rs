@@ -84,7 +84,7 @@ fn a_finer_grid_finds_no_more() {
     for (p, omega) in [(1.0, 2.0), (1.7, 0.87)] {
         let pendulum = driven(0.1, p, omega);
         for (n, w) in [(1, 0), (2, 0), (1, 1), (2, 1), (2, 2)] {
-            let [coarse, fine] = [120, 180].map(|cells| {
+            let [coarse, fine] = [80, 120].map(|cells| {
                 orbits(&pendulum, &request(n, w, cells), &Control::default()).expect("a search")
             });
             let counts = (coarse.closed.len(), fine.closed.len());

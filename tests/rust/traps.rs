@@ -187,7 +187,7 @@ fn within(band: &Band) -> Vec<State> {
 fn a_trap_holds_no_other_attractor() {
     // Pendulums with a torque near the saddle-node of rest, or anywhere, undriven or weakly driven.
     let mut seen = [0; 2];
-    for k in 1..=48_u32 {
+    for k in 1..=30_u32 {
         let draw = |ratio: f64| (0.5 + f64::from(k) * ratio).fract();
         let gamma = 0.05 * 30_f64.powf(draw(0.819_172_513_396_164_4));
         let near =
@@ -233,5 +233,5 @@ fn a_trap_holds_no_other_attractor() {
             }
         }
     }
-    assert!(seen[0] > 8 && seen[1] > 24, "{seen:?}");
+    assert!(seen[0] > 5 && seen[1] > 15, "{seen:?}");
 }
