@@ -24,7 +24,6 @@ FEWEST, MOST = 2.0, 6.5  # Least and greatest number of tick steps of a range of
 FURTHEST = 1000  # Multiple of pi beyond which angles have plain numbers as labels
 NARROW = 1e-4
 """Width of a window, relative to its distance from 0, below which its ticks have an offset."""
-CLOSEST = 0.8  # Least distance of ticks of a logarithmic axis, over that of as many as have room
 _FINE = 8  # Pixels of the narrowest cell if cells differ in width
 MOST_COPIES = 100  # Greatest number of copies of a point, at distances of 2 pi, in a window
 
@@ -151,16 +150,15 @@ def plain_ticks(low: float, high: float) -> Ticks:
 
 
 def log_ticks(low: float, high: float, most: int = 8) -> list[float]:
-    """Return ticks at powers of ten, and round numbers between them if they are not too many."""
+    """Return at most ``most`` ticks at 1, 2, 5, or 1, 3, or 1 times powers of ten."""
     powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
     listed: list[float] = []
-    for steps in (range(1, 10), (1, 2, 5), (1, 3), (1,)):
+    for steps in ((1, 2, 5), (1, 3), (1,)):
         every = (m * 10.0**k for k in powers for m in steps)
         listed = [at for at in every if low * 0.999 <= at <= high * 1.001]
-        gap = np.min(np.diff(np.log10(listed)), initial=math.inf)
-        if most * gap >= CLOSEST * math.log10(high / low):
+        if len(listed) <= most:
             break
-    if len(listed) < 2:  # noqa: PLR2004 (a scale)
+    if len(listed) < 3:  # noqa: PLR2004 (a scale)
         return [at for at, _ in plain_ticks(low, high)]
     return listed[:: -(-len(listed) // most)]
 
