@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 
 SPEED_REACH: Final = 0.7  # Half-width of the polynomials that give speeds, rad of phase
+GAP: Final = 0.4  # Share of one interval in the time of a window from which it is a gap
 FALSE_READING: Final = 8.0  # Standard deviations from a median of five that replaces a reading
 CERTAIN_GROWTH: Final = 4.0  # Standard errors of ``tau^2`` above which it is significant
 LEAST_GROWTH: Final = 0.1  # Least ``(tau v)^2`` at the greatest speed, over ``still^2``
@@ -86,7 +87,12 @@ def speed_of(time: Floats, theta: Floats, fastest: float) -> Floats:
     # needs the speed at its stamp, or the fit is biased. The offset of a stamp is predicted from
     # its neighbours without the stamp itself, and limited next to gaps.
     off = np.clip(adapted(time, middle) / middle[reach] / slope, -1.0, 1.0)
-    return np.asarray(np.abs(speed + off * np.gradient(speed)))
+    speed = np.abs(speed + off * np.gradient(speed))
+    # Across a gap the time is no polynomial in the sample number: the speed is interpolated.
+    steps = np.diff(np.pad(time, reach, mode="reflect", reflect_type="odd"))
+    windows = np.lib.stride_tricks.sliding_window_view(steps, 2 * reach)
+    sound = windows.max(axis=1) < GAP * windows.sum(axis=1)
+    return np.interp(time, time[sound], speed[sound]) if sound.any() else speed
 
 
 def _calm(theta: Floats) -> Floats:
