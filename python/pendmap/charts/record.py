@@ -117,7 +117,7 @@ def _flags(run: Run) -> Panel:
         if one.from_s is not None and one.to_s is not None
     ]
     for left, right, number, finding in sorted(placed, key=operator.itemgetter(0)):
-        row = int(np.argmin(last))
+        row = int(left - last[0] < least)
         if right < left or left - last[row] < least:
             continue
         last[row] = left
@@ -162,7 +162,8 @@ def _residuals(run: Run) -> Panel:
         return Panel("last", title, none, none, [Text(0.5, 0.5, "too few samples")])
     some = slice(None, None, max(speed.size // MOST_POINTS, 1))
     marks: list[Mark] = [Points(speed[some], residual[some], colour="#a9b8cc", size=0.8)]
-    reach = np.linspace(0.0, float(speed.max()), 50)
+    # Beside outliers a local fit may fail: the fastest hundredth is no measure.
+    reach = np.linspace(0.0, 1.1 * float(np.quantile(speed, 0.99)), 50)
     law = noise.law
     sigma = np.full(50, noise.sigma) if law is None else np.hypot(law.still, law.tau * reach)
     marks.append(Line(reach, 1e3 * sigma, colour=FALSE, width=1.8, name="standard deviation"))
