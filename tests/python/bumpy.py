@@ -39,19 +39,15 @@ def experiment(folder: Path, *, seed: int = 1) -> Path:
     """Write four free decays, one of them held out, read by an encoder with noise."""
     folder.mkdir()
     rng = np.random.default_rng(seed)
+    time, count = np.arange(0.0, 20.0, 0.01), math.tau / 4096
     lines = ["[rig]", "encoder_counts = 4096"]
+
+    def slope(_: float, y: list[float]) -> list[float]:
+        return [y[1], -(W0**2) * math.sin(y[0]) - C_OVER_M * y[1] + torque(y[0])]
+
     for k, start in enumerate((1.6, 2.4, -2.0, 1.2)):
-        time = np.arange(0.0, 20.0, 0.01)
-        path = solve_ivp(
-            lambda _, y: [y[1], -(W0**2) * math.sin(y[0]) - C_OVER_M * y[1] + torque(y[0])],
-            (0.0, 20.0),
-            [start, 0.0],
-            t_eval=time,
-            rtol=1e-11,
-            atol=1e-12,
-        ).y[0]
-        count = math.tau / 4096
-        reading = np.round((path + rng.normal(0, 1.5e-3, time.size)) / count) * count
+        solved = solve_ivp(slope, (0.0, 20.0), [start, 0.0], t_eval=time, rtol=1e-11, atol=1e-12)
+        reading = np.round((solved.y[0] + rng.normal(0, 1.5e-3, time.size)) / count) * count
         table = np.column_stack([time, reading])
         name = f"run_{k}.csv"
         np.savetxt(folder / name, table, delimiter=",", header="t_s,theta_rad", comments="")

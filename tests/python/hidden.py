@@ -50,10 +50,7 @@ def diagnosed(
     max_effects: int = 3,
     **given: Any,  # noqa: ANN401 (parameters of the request)
 ) -> tuple[Discrepancy, dict[str, dict[str, float]]]:
-    """Hide effects and diagnose the experiment; return the diagnosis and the truth.
-
-    Each experiment is diagnosed once in a test run, over all processes.
-    """
+    """Hide effects; return the diagnosis, made once in a test run of all processes, and truth."""
     choices = sorted(({"seed": 3} | given).items())
     asked = repr((effects, tuple(without), max_effects, choices)).encode()
     known = KNOWN[0] / f"{hashlib.sha256(asked).hexdigest()}.pickle"

@@ -190,7 +190,7 @@ def statistics(one: ForcedComparison) -> Panel:
     """Return one row per statistic: the ensemble's histogram, and the record's value as a line."""
     marks: list[Mark] = []
     for base, item in enumerate(one.statistics, 1):
-        mine, low, high = (written(item, value, 3) for value in (item.measured, *item.ci95))
+        mine, low, high = (written(value, 3) for value in (item.measured, *item.ci95))
         unit = f" {item.unit}" if item.unit and math.isfinite(item.ci95[0]) else ""
         text = f"{item.name} {mine} ({low if low == high else f'{low} to {high}'}){unit}"
         marks.append(Text(0.0, base - TALL - 0.07, text, align=("left", "bottom"), size=7.5))

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from pendmap.identification.runs import FitRun
     from pendmap.records import Experiment, Run
-    from pendmap.signal import Floats
+    from pendmap.signal import Floats, Mask
 
 HELD: Final = ((0.25, 0.35), (0.65, 0.75))
 """Fractions of a run held out if no whole run is: a fifth in all, at large and small swings."""
@@ -34,6 +34,8 @@ BLOCKS: Final = 50
 FEWEST_BLOCKS: Final = 1000
 """Fewest blocks of a record; with fewer readings the integrator's own steps dominate the cost."""
 LEAST_OF_BLOCK: Final = 3  # Fewest readings of a block
+OF_ACCELERATION: Final = "computed from an acceleration, whose own errors are not among the effects"
+OF_RATE: Final = "an integrated velocity, whose errors add up"
 NEIGHBOURS: Final = 2  # Blocks on either side to which a parabola is fitted
 
 
@@ -60,11 +62,10 @@ class DataSplit:
     @property
     def floors(self) -> tuple[float, ...]:
         """Share of rounding (white, variance ``count^2 / 12``) in each fitted run's noise."""
-        readings = (self.readings[k] for k in self.fitted_of)
-        pairs = zip(readings, self.fitted, strict=True)
+        pairs = zip(self.fitted_of, self.fitted, strict=True)
         return tuple(
-            r.count**2 / 12 / float(np.mean(np.square(run.sigma))) if r.sigma > 0 else 0.0
-            for r, run in pairs
+            self.readings[k].count ** 2 / 12 / float(np.mean(np.square(run.sigma)))
+            for k, run in pairs
         )
 
     @property
@@ -89,16 +90,9 @@ def split_records(experiment: Experiment) -> DataSplit:
     experiment.refuse_still(runs)
     runs = tuple(run for run in runs if run.moves)
     for run in runs:
-        if run.accelerometer is not None:
-            raise InputError(
-                f"{run.name}: its angle is computed from an acceleration, whose own errors are not"
-                " among the effects: it must be a record with an angle"
-            )
-        if run.gyroscope is not None:
-            raise InputError(
-                f"{run.name}: its angle is an integrated velocity, whose errors add up: it must be"
-                " a record with an angle"
-            )
+        for sensor, why in ((run.accelerometer, OF_ACCELERATION), (run.gyroscope, OF_RATE)):
+            if sensor is not None:
+                raise InputError(f"{run.name}: its angle is {why}: it must be a measured angle")
         if run.kind == "forced" and not (run.drive or run.pivot):
             raise InputError(f"{run.name}: a forced run must have drive or pivot, neither is given")
     readings = _readings(runs)
@@ -166,11 +160,7 @@ def _hold_stretches(
         for a, b in [] if inside and run.forced else _stretches(run):
             back[a:b] = run.counted[a:b]
             if not inside:
-                time, theta, sigma = run.time[a:b], run.theta[a:b], run.sigmas[a:b]
-                good = run.counted[a:b]
-                held.append(
-                    dataclasses.replace(run, time=time, theta=theta, sigma=sigma, trusted=good)
-                )
+                held.append(samples_of(run, slice(a, b)))
                 held_of.append(k)
         fitted.append(dataclasses.replace(run, trusted=run.counted & ~back))
         if inside and back.any():
@@ -190,6 +180,13 @@ def _stretches(run: FitRun) -> list[tuple[int, int]]:
     samples = np.flatnonzero(run.counted)
     ends = [samples[[int(f * (samples.size - 1)) for f in part]].tolist() for part in HELD]
     return [(a, b) for a, b in ends if b - a >= FEWEST]
+
+
+def samples_of(run: FitRun, which: Mask | slice) -> FitRun:
+    """Return a run with only some of its samples."""
+    time, theta, sigma = run.time[which], run.theta[which], run.sigmas[which]
+    good = run.counted[which]
+    return dataclasses.replace(run, time=time, theta=theta, sigma=sigma, trusted=good)
 
 
 def average_blocks(run: FitRun) -> FitRun:

@@ -23,7 +23,6 @@ from pendmap.records import experiment_of, summary
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from pendmap.comparison.forced import Statistic
     from pendmap.comparison.itinerary import Cycle, Steady
     from pendmap.files.saved import About
     from pendmap.formatting import Table
@@ -66,31 +65,18 @@ COLUMNS: Final = {
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class Comparison(Saved):
-    """Comparison of a model with an experiment.
-
-    Parameters
-    ----------
-    model : Rig
-        The model with its effects, including those on the reading.
-    experiment : Experiment
-        The records.
-    runs : tuple of RunComparison
-        Comparisons with the free decays.
-    forced : tuple of ForcedComparison
-        Comparisons with the forced runs.
-    left_out : tuple of (str, str)
-        Name of each other run, and the reason why it is not compared.
-    """
+    """Comparison of a model with an experiment."""
 
     KIND: ClassVar[str] = "comparison"
     ARRAYS = ARRAYS
     ROWS: ClassVar[str] = "row"
     COLUMNS = COLUMNS
 
-    model: Rig
-    experiment: Experiment
-    runs: tuple[RunComparison, ...]
-    forced: tuple[ForcedComparison, ...] = ()
+    model: Rig  #: The model with its effects, including those on the reading.
+    experiment: Experiment  #: The records.
+    runs: tuple[RunComparison, ...]  #: Comparisons with the free decays.
+    forced: tuple[ForcedComparison, ...] = ()  #: Comparisons with the forced runs.
+    #: Name of each other run, and the reason why it is not compared.
     left_out: tuple[tuple[str, str], ...] = ()
 
     def __repr__(self) -> str:
@@ -109,10 +95,9 @@ class Comparison(Saved):
         Returns
         -------
         pandas.DataFrame
-            Index ``run`` and ``quantity``; ``record`` and ``model`` (of an ensemble the median),
-            ``low`` and ``high`` (95 % of the ensemble), ``chance`` (its two-sided p-value of the
-            record), ``error_percent`` (absolute), nan where there is none, and ``unit``. The
-            quantity ``residual`` has the noise of the record and the rms of the model.
+            Index ``run`` and ``quantity``; ``record``, ``model`` (of an ensemble the median),
+            ``low`` and ``high`` (its 95 %), ``chance`` (two-sided p-value), ``error_percent``, nan
+            where there is none, and ``unit``. ``residual`` has the noise and the rms.
         """
         rows = [
             {"run": one.run.name, "unit": ""} | row
@@ -196,10 +181,6 @@ def compare(  # noqa: PLR0913 (each is asked for by name)
     if threads is not None:
         errors.check_whole("threads", threads, 1, errors.MOST_THREADS)
     errors.check_callable("progress", progress)
-    sampled = [run for run in experiment.runs if not run.peaks_only]
-    if not sampled:
-        raise InputError(f"{experiment.path}: one run or more must have samples, none has")
-    experiment.refuse_still(sampled)
     free: list[RunComparison] = []
     forced: list[ForcedComparison] = []
     out: list[tuple[str, str]] = []
@@ -209,9 +190,9 @@ def compare(  # noqa: PLR0913 (each is asked for by name)
             _check_comparable(model, run)
             if run.kind == "free":
                 free.append(compare_free(model, run))
-                continue
-            shown = part(progress, driven.index(run.name), len(driven))
-            forced.append(compare_forced(model, run, ensemble, threads=threads, progress=shown))
+            else:
+                shown = part(progress, driven.index(run.name), len(driven))
+                forced.append(compare_forced(model, run, ensemble, threads, shown))
         except (FitDiverged, InputError) as error:  # the other runs are still compared
             out.append((run.name, str(error)))
     if not free and not forced:
@@ -222,21 +203,19 @@ def compare(  # noqa: PLR0913 (each is asked for by name)
 
 def _check_comparable(model: Rig, run: Run) -> None:
     """Raise InputError with the reason why a run cannot be compared with a model."""
-    time, swing = run.time[run.trusted], math.tau / model.w0
+    time, swing, forced = run.time[run.trusted], math.tau / model.w0, run.kind == "forced"
     seconds = float(np.ptp(time)) if time.size else 0.0
-    if run.peaks_only:
-        raise InputError("it has peaks only")
-    if run.copied:
-        raise InputError("it is a copy of another run")
-    if not run.moves:
-        raise InputError("nothing moves in it")
-    if run.kind == "forced" and run.drive is None and run.pivot is None:
-        raise InputError("neither its drive nor its pivot is given")
-    if run.kind == "forced" and (time.size < FEWEST or seconds < swing):
-        raise InputError(
-            f"it is too short: {counted(time.size, 'sample')} over {seconds:.3g} s; {FEWEST} over "
-            f"{swing:.3g} s, one swing, are needed"
-        )
+    reasons = {
+        "it has peaks only": run.peaks_only,
+        "it is a copy of another run": run.copied,
+        "nothing moves in it": not run.moves,
+        "neither its drive nor its pivot is given": forced and not (run.drive or run.pivot),
+        f"it is too short: {counted(time.size, 'sample')} over {seconds:.3g} s; {FEWEST} over "
+        f"{swing:.3g} s, one swing, are needed": forced and (time.size < FEWEST or seconds < swing),
+    }
+    for reason, applies in reasons.items():
+        if applies:
+            raise InputError(reason)
 
 
 def as_json(comparison: Comparison) -> dict[str, Any]:
@@ -283,7 +262,6 @@ def _forced(one: ForcedComparison) -> dict[str, Any]:
         "drive": drive and dict(drive),
         "phi": phase and {"value": phase.value, "stderr": phase.stderr},
         "members": one.ensemble.members,
-        "members_lost": one.lost,
         "spread": one.ensemble.spread,
         "steady": one.steady and _steady(one.steady),
     }
@@ -305,16 +283,11 @@ def _steady(steady: Steady) -> dict[str, Any]:
     }
 
 
-def written(of: Statistic, value: float, digits: int = 4) -> str:
-    """Return a value of a statistic as text."""
-    return "not yet" if not math.isfinite(value) else _number(value, digits, whole=not of.unit)
-
-
-def _number(value: float, digits: int = 4, *, whole: bool = False) -> str:
+def written(value: float, digits: int = 4) -> str:
     """Return a number as text: empty for NaN, ``not yet`` for an infinite time."""
     if not math.isfinite(value):
         return "" if math.isnan(value) else "not yet"
-    return f"{value:.0f}" if whole or abs(value) >= 10**digits else f"{value:.{digits}g}"
+    return f"{value:.0f}" if abs(value) >= 10**digits else f"{value:.{digits}g}"
 
 
 def _quantities(one: RunComparison | ForcedComparison) -> Iterator[dict[str, Any]]:
@@ -341,9 +314,9 @@ def _table(comparison: Comparison) -> Table:
         rows.append([one.run.name + (" (held out)" if one.run.hold_out else ""), "", "", "", ""])
         for row in table.loc[one.run.name].itertuples():
             name = f"  {row.Index}" + (f" ({row.unit})" if row.unit else "")
-            model = percent(row.error_percent) or _number(row.model)
-            ends = "" if math.isnan(row.low) else f"{_number(row.low)} to {_number(row.high)}"
-            rows.append([name, _number(row.record), model, ends, _number(row.chance, 2)])
+            model = percent(row.error_percent) or written(row.model)
+            ends = "" if math.isnan(row.low) else f"{written(row.low)} to {written(row.high)}"
+            rows.append([name, written(row.record), model, ends, written(row.chance, 2)])
     return ["run", "record", "model", "95 % of ensemble", "p-value"], rows
 
 
@@ -369,8 +342,6 @@ def _lines(comparison: Comparison) -> Iterator[str]:
             yield f"{name}: the drive's phase is not given: {forced.phase.value:.4g} rad was fitted"
         if forced.steady is not None:
             yield f"{name}: {_steady_line(forced.steady)}"
-        if forced.lost:
-            yield f"{name}: {forced.lost} of {forced.ensemble.members} members overflowed"
     for name, why in comparison.left_out:
         yield f"{name}: not compared: {why}"
     yield from summary.finding_lines(comparison.experiment, *(one.run for one in comparison.every))
@@ -379,13 +350,13 @@ def _lines(comparison: Comparison) -> Iterator[str]:
 def _steady_line(steady: Steady) -> str:
     """Return the text on the steady states of a record and of the model."""
     ends = [f"{one.cycle.name} from {percent(100 * one.share)}" for one in steady.reached]
-    share = sum(one.share for one in steady.reached)
-    if share < 1 - 1e-9:
-        ends.append(f"no cycle from {percent(100 * (1 - share))}")
-    head = f"settles on {steady.measured.name}; the model on {', '.join(ends)} of the starts"
+    without = 1 - sum(one.share for one in steady.reached)
+    ends += [f"no cycle from {percent(100 * without)}"] if without > 1e-9 else []  # noqa: PLR2004
+    text = f"settles on {steady.measured.name}; the model on {', '.join(ends)} of the starts"
     if steady.model is None:
-        return f"{head}: not on the measured one"
-    differ = f"{steady.rms:.2g} rad and {steady.rms_velocity:.2g} rad/s rms"
-    if math.isfinite(steady.overestimate):
-        differ += f", in amplitude by {100 * steady.overestimate:+.2g} %"
-    return f"{head}. Over a cycle they differ by {differ}"
+        return f"{text}: not on the measured one"
+    text += (
+        f". Over a cycle they differ by {steady.rms:.2g} rad and {steady.rms_velocity:.2g} rad/s"
+    )
+    wide = steady.overestimate
+    return f"{text} rms" + (f", in amplitude by {100 * wide:+.2g} %" if math.isfinite(wide) else "")

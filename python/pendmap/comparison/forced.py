@@ -9,15 +9,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendmap import errors
 from pendmap.comparison.itinerary import UNITS, Ruler, reached_cycles, steady_state
-from pendmap.errors import (
-    MOST_SEED,
-    FitDiverged,
-    InputError,
-    check_number,
-    check_whole,
-    core_errors,
-)
+from pendmap.errors import FitDiverged, InputError
 from pendmap.identification.fit import fit_runs
 from pendmap.identification.readings import as_fit_run, reading_of_run
 from pendmap.identification.runs import bare_run, rig_of
@@ -34,7 +28,7 @@ if TYPE_CHECKING:
     from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
     from pendmap.records import Run
-    from pendmap.signal import Floats, Mask
+    from pendmap.signal import Floats
 
 
 _AT_ONCE: Final = 4_000_000  # Samples held in memory at once
@@ -69,10 +63,10 @@ class Ensemble:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        check_whole("members", self.members, 20, 100_000)
-        if not 0 <= check_number("spread", self.spread) <= 1:
+        errors.check_whole("members", self.members, 20, 100_000)
+        if not 0 <= errors.check_number("spread", self.spread) <= 1:
             raise InputError(f"spread must be a number from 0 to 1 rad, got {self.spread:g}")
-        check_whole("seed", self.seed, 0, MOST_SEED)
+        errors.check_whole("seed", self.seed, 0, errors.MOST_SEED)
 
 
 def simulated_readings(
@@ -87,7 +81,7 @@ def simulated_readings(
 
     units = Units(model.w0, si=True)
     theta, velocity = starts
-    with core_errors(FitDiverged):
+    with errors.core_errors(FitDiverged):
         return _core.replay(
             bare_run(run, rig_of(run, model), units),
             np.ascontiguousarray(theta, dtype=np.float64),
@@ -128,55 +122,25 @@ class Statistic:
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class ForcedComparison:
-    """Comparison of a model with one forced run.
+    """Comparison of a model with one forced run."""
 
-    Parameters
-    ----------
-    run : Run
-        The record.
-    sigma : float
-        Noise of the record, rad.
-    rms : float
-        Root mean square residual in windows of up to three swings, each with a fitted initial
-        state, rad.
-    windows : int
-        Number of these windows.
-    start, start_stderr : (float, float)
-        Angle (rad) and velocity (rad/s) at the beginning, fitted to the first window, and their
-        standard errors.
-    phase : Estimate or None
-        Fitted phase of the drive, rad, if it was not stated.
-    time, measured : ndarray, shape (N,)
-        The record at equal times, s and rad.
-    velocity : ndarray, shape (N,)
-        Velocity of the record, rad/s.
-    example : ndarray, shape (2, N)
-        Reading and velocity of the member whose statistics are nearest to the ensemble's medians.
-    lost : int
-        Number of members whose motion overflowed.
-    statistics : tuple of Statistic
-        Wells visited, escapes, angle covered, time to settle, greatest velocity.
-    steady : Steady or None
-        The steady state, if the record reaches one under a periodic drive.
-    ensemble : Ensemble
-        Choice of the members' initial states.
-    """
-
-    run: Run
-    sigma: float
+    run: Run  #: The record.
+    sigma: float  #: Noise of the record, rad.
+    #: Root mean square residual, rad, in windows of up to three swings with fitted initial states.
     rms: float
-    windows: int
-    start: tuple[float, float]
-    start_stderr: tuple[float, float]
-    phase: Estimate | None
-    time: Floats
-    measured: Floats
-    velocity: Floats
+    windows: int  #: Number of these windows.
+    start: tuple[float, float]  #: Angle (rad) and velocity (rad/s) fitted at the beginning.
+    start_stderr: tuple[float, float]  #: Their standard errors.
+    phase: Estimate | None  #: Fitted phase of the drive, rad, if it was not stated.
+    time: Floats  #: Equal times, s, shape (N,).
+    measured: Floats  #: The record at these times, rad.
+    velocity: Floats  #: Velocity of the record, rad/s.
+    #: Reading and velocity, shape (2, N), of the member nearest to the ensemble's medians.
     example: Floats
-    lost: int
+    #: Wells visited, escapes, angle covered, time to settle, greatest velocity.
     statistics: tuple[Statistic, ...]
-    steady: Steady | None
-    ensemble: Ensemble
+    steady: Steady | None  #: The steady state, if the record reaches one under a periodic drive.
+    ensemble: Ensemble  #: Choice of the members' initial states.
 
     def __repr__(self) -> str:
         held = ", held out" if self.run.hold_out else ""
@@ -191,17 +155,10 @@ def compare_forced(
     model: Rig,
     run: Run,
     ensemble: Ensemble,
-    *,
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> ForcedComparison:
-    """Compare a model with a forced run; only an unknown phase of the drive is fitted.
-
-    Chaotic trajectories diverge however good the model is, so statistics are compared over a
-    neighbourhood of the measured initial state. The noise of the record is added to the members'
-    readings. If the record ends on a steady state, members are integrated to theirs, and the two
-    cycles are compared at equal phase of the drive.
-    """
+    """Compare a model with a forced run; only an unknown phase of the drive is fitted."""
     worth = reading_of_run(run)
     given = as_fit_run(run, worth)
     fit = fit_runs([given], model, free=(), profiled=())
@@ -214,10 +171,7 @@ def compare_forced(
     ruler = Ruler(time[1] - time[0], math.tau / model.w0, period, worth.sigma)
     starts = drawn_starts(start, covariance, ensemble, model.w0)
     simulated = functools.partial(simulated_readings, given, model, threads=threads)
-    members, finite = _members(simulated, starts, time, ruler, progress)
-    if not members:
-        raise InputError(f"{run.name}: the model overflows from every start")
-    starts = starts[:, finite]
+    members = _members(simulated, starts, time, ruler, progress)
     statistics = tuple(
         Statistic(
             name, UNITS.get(name, ""), float(value), np.array([m[name] for m in members], float)
@@ -242,7 +196,6 @@ def compare_forced(
         measured=measured,
         velocity=ruler.velocity(measured),
         example=np.stack([reading, ruler.velocity(reading)]),
-        lost=int((~finite).sum()),
         statistics=statistics,
         steady=cycles,
         ensemble=ensemble,
@@ -290,22 +243,20 @@ def _members(
     time: Floats,
     ruler: Ruler,
     progress: Callable[[int, int], object] | None,
-) -> tuple[list[dict[str, float]], Mask]:
-    """Return the statistics of each member that stayed finite, and which did."""
+) -> list[dict[str, float]]:
+    """Return the statistics of each member, with noise like the record's."""
     draw = np.random.default_rng(0)  # results are insensitive to the noise's seed
     count, many = starts.shape[1], max(1, _AT_ONCE // time.size)
     members: list[dict[str, float]] = []
-    finite = np.zeros(count, dtype=bool)
     for first in range(0, count, many):
         block = simulated(starts[:, first : first + many], time)
-        for k, reading in enumerate(block, first):
-            noise = draw.normal(0.0, ruler.sigma, time.size)
-            finite[k] = np.isfinite(reading).all()
-            if finite[k]:
-                members.append(ruler.statistics(reading + noise))
+        if not np.isfinite(block).all():
+            raise InputError("the model overflows from a start near the measured one")
+        block += draw.normal(0.0, ruler.sigma, block.shape)
+        members += [ruler.statistics(reading) for reading in block]
         if progress is not None:
             progress(min(first + many, count), count)
-    return members, finite
+    return members
 
 
 def _example(statistics: tuple[Statistic, ...]) -> int:

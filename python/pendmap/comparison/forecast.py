@@ -7,21 +7,18 @@ the initial state.
 
 Periods and peaks: as in the paper's figure 7 a model is integrated from the first measured peak, at
 rest; nothing is fitted. Fitted damping may be negative there.
-
-A fitted model may diverge in another record, from another state or with another size of an effect.
-The part of a diagnosis that needs this motion is then omitted, and the reason is kept.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import functools
 import math
 from typing import TYPE_CHECKING, Final, NamedTuple, TypeVar
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
+from pendmap.comparison.data import samples_of
 from pendmap.identification.motion import Motion, fit_states, run_forward
 from pendmap.identification.peaks import find_peaks
 from pendmap.identification.runs import FitRun
@@ -39,12 +36,7 @@ if TYPE_CHECKING:
 Reasons = dict[str, str]  # Reason why a part was not computed, by its field in the JSON object
 Part = TypeVar("Part")
 LOST: Final = (ArithmeticError, np.linalg.LinAlgError)
-"""Errors raised by a diverging motion, directly or in arithmetic and linear algebra with it."""
-INSTANTS: Final = 150  # Instants of the records at which the torque of an effect is evaluated
-STEP: Final = 1e-3
-"""Integration time from each instant, in periods of small swings, short against the motion."""
-EXACT: Final = 1e-9
-"""Nominal standard error of readings, rad, which sets the integrator's tolerance."""
+"""Errors raised by a motion that diverges in another record or from another state."""
 REACH: Final = 2 / 3
 """Length of forecasts over the median stretch; starts are spread over the rest of a stretch."""
 STARTS: Final = 12  # Most starts in a stretch, at least half a swing apart
@@ -75,47 +67,6 @@ class Fits(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True)
-class Strength:
-    """Strength of an effect over the motion of the fitted records."""
-
-    torque: float  # Root mean square of its torque over the moment of inertia, rad/s^2
-    greatest_torque: float  # Greatest size of that torque, rad/s^2
-    reading: float  # Root mean square of its contribution to the reading, rad
-    greatest_reading: float  # Greatest size of that contribution, rad
-
-
-def effect_strength(fit: TrajectoryFit, fitted: Sequence[FitRun], effect: str) -> Strength:
-    """Return the strength of an effect from the motion with and without it; raises FitDiverged."""
-    step = STEP * 2 * np.pi / fit.model.w0
-    runs, states = [], []
-    count = -(-INSTANTS // len(fitted))
-    for k, run in enumerate(fitted):
-        theta, velocity = fit.curves[k]
-        known = np.flatnonzero(np.isfinite(theta))
-        drive = fit.drive_of(run, k)
-        for at in known[np.linspace(0, known.size - 1, min(count, known.size)).astype(int)]:
-            time = run.time[at] + step * np.array([0.0, 0.5, 1.0])  # a record has at least three
-            runs.append(
-                dataclasses.replace(
-                    run, time=time, theta=np.zeros(3), sigma=EXACT, trusted=None, drive=drive
-                )
-            )
-            states.append((float(theta[at]), float(velocity[at])))
-    motion = Motion.of(fit)
-    with_it = run_forward(motion, runs, states)
-    without = run_forward(motion.without(effect), runs, states)
-    pairs = list(zip(with_it, without, strict=True))
-    torque = np.array([(a[1, 2] - b[1, 2]) / step for (_, a), (_, b) in pairs])
-    reading = np.array([a[0] - b[0] for (a, _), (b, _) in pairs])
-    return Strength(
-        float(np.sqrt(np.mean(torque**2))),
-        float(np.abs(torque).max()),
-        float(np.sqrt(np.mean(reading**2))),
-        float(np.abs(reading).max()),
-    )
-
-
-@dataclasses.dataclass(frozen=True)
 class Forecast:
     """Error of forecasts against their horizon."""
 
@@ -133,7 +84,6 @@ class _Stretch(NamedTuple):
     run: FitRun
     place: int  # Index of the record among those held out
     held: Mask  # Held-out readings
-    good: Mask  # Included readings, held out or not
     earliest: float  # First time with a swing of readings before it, s
     latest: float  # Last time, s
 
@@ -141,24 +91,20 @@ class _Stretch(NamedTuple):
 class _Launch(NamedTuple):
     """Start of a forecast in a stretch."""
 
-    run: FitRun
     place: int  # As in the stretch
-    behind: Mask  # Readings of the swing before, to which the state is fitted
-    ahead: Mask  # Held-out readings up to the horizon
+    before: FitRun  # Readings of the swing before, to which the state is fitted
+    whole: FitRun  # These, and the held-out readings up to the horizon
     bins: Indices  # Bin of the horizon of each reading ahead
 
 
-def compare_forecasts(
-    data: DataSplit, base: Fits, best: Fits, reasons: Reasons
-) -> tuple[Forecast, ...]:
+def compare_forecasts(data: DataSplit, base: Fits, best: Fits) -> tuple[Forecast, ...]:
     """Return the forecast errors of free and of forced runs."""
     swing = math.tau / base.fitted.model.w0
     every = [s for place in range(len(data.held)) for s in _stretches(data, place, swing)]
     forecasts = []
     for kind in ("free", "forced"):
         stretches = [s for s in every if s.run.forced == (kind == "forced")]
-        compute = functools.partial(_forecast, kind, stretches, base, best, swing)
-        forecasts.append(compute_part(reasons, f"forecast.{kind}", compute, None))
+        forecasts.append(_forecast(kind, stretches, base, best, swing))
     return tuple(forecast for forecast in forecasts if forecast is not None)
 
 
@@ -168,14 +114,13 @@ def _stretches(data: DataSplit, place: int, swing: float) -> list[_Stretch]:
     run = data.fitted[data.fitted_of.index(of)] if of in data.fitted_of else held
     back = np.zeros(run.time.shape, bool)
     back[np.searchsorted(run.time, held.time)] = held.counted
-    good = back | run.counted
+    run = dataclasses.replace(run, trusted=back | run.counted)
     samples = np.flatnonzero(back)
     if samples.size < FEWEST:
         return []
-    begin = float(run.time[np.argmax(good)]) + swing
-    parts = np.split(samples, np.flatnonzero(np.diff(run.time[samples]) > swing) + 1)
-    ends = [(float(run.time[part[0]]), float(run.time[part[-1]])) for part in parts]
-    return [_Stretch(run, place, back, good, max(first, begin), last) for first, last in ends]
+    begin = float(run.time[np.argmax(run.counted)]) + swing
+    parts = np.split(run.time[samples], np.flatnonzero(np.diff(run.time[samples]) > swing) + 1)
+    return [_Stretch(run, place, back, max(float(t[0]), begin), float(t[-1])) for t in parts]
 
 
 def _forecast(
@@ -190,7 +135,7 @@ def _forecast(
     launches = [one for s in stretches for one in _launches(s, reach, swing, count)]
     if not launches:
         return None
-    floors = [one.run.sigmas[one.ahead] ** 2 for one in launches if one.ahead.any()]
+    floors = [one.whole.sigmas[-one.bins.size :] ** 2 for one in launches if one.bins.size]
     floor = math.sqrt(float(np.mean([np.mean(squares) for squares in floors])))
     before, after = (_errors(model, launches, swing, count) for model in (base, best))
     middles = (np.arange(count) + 0.5) * reach / count
@@ -206,37 +151,31 @@ def _launches(stretch: _Stretch, reach: float, swing: float, count: int) -> list
     launches = []
     for at in np.linspace(stretch.earliest, stretch.earliest + room, starts):
         later = run.time - at
-        behind = stretch.good & (later > -swing) & (later <= 0)
+        behind = run.counted & (later > -swing) & (later <= 0)
         ahead = stretch.held & (later > 0) & (later <= reach)
         bins = np.minimum((later[ahead] / reach * count).astype(np.intp), count - 1)
         if np.count_nonzero(behind) >= FEWEST:
-            launches.append(_Launch(run, stretch.place, behind, ahead, bins))
+            before, whole = samples_of(run, behind), samples_of(run, behind | ahead)
+            launches.append(_Launch(stretch.place, before, whole, bins))
     return launches
 
 
 def _errors(model: Fits, launches: list[_Launch], swing: float, count: int) -> Floats:
     """Return the root mean square error in each bin, rad."""
-    before, whole = [], []
-    for one in launches:
-        drive = model.held.drive_of(one.run, one.place)
-        run = dataclasses.replace(one.run, drive=drive)
-        before.append(_samples(run, one.behind))
-        whole.append(_samples(run, one.behind | one.ahead))
+    drives = [model.held.drive_of(one.whole, one.place) for one in launches]
+    before, whole = (
+        [dataclasses.replace(run, drive=drive) for run, drive in zip(runs, drives, strict=True)]
+        for runs in ([one.before for one in launches], [one.whole for one in launches])
+    )
     motion = Motion.of(model.fitted)
     states = fit_states(motion, before, [_guess(run, swing) for run in before])
     squares, samples = np.zeros(count), np.zeros(count)
     for one, (readings, _) in zip(launches, run_forward(motion, whole, states), strict=True):
-        error = one.run.theta[one.ahead] - readings[readings.size - one.bins.size :]
-        error = np.angle(np.exp(1j * error))  # modulo a turn
+        first = readings.size - one.bins.size
+        error = np.angle(np.exp(1j * (one.whole.theta - readings)[first:]))  # modulo a turn
         squares += np.bincount(one.bins, error**2, count)
         samples += np.bincount(one.bins, minlength=count)
     return np.asarray(np.sqrt(squares / np.where(samples > 0, samples, math.nan)))
-
-
-def _samples(run: FitRun, chosen: Mask) -> FitRun:
-    """Return a run with only the selected samples."""
-    sigma, time, theta = run.sigmas[chosen], run.time[chosen], run.theta[chosen]
-    return dataclasses.replace(run, time=time, theta=theta, sigma=sigma, trusted=None)
 
 
 def _guess(run: FitRun, swing: float) -> tuple[float, float]:
@@ -323,29 +262,23 @@ class Cycles:
     name: str  # Name of the run
     held_out: bool  # True if the whole run is held out
     peaks: Peaks  # Measured peaks
-    errors: dict[str, PeakErrors]  # By model, ``before`` and ``after``, unless it diverges
+    errors: dict[str, PeakErrors]  # By model, ``before`` and ``after``
 
 
-def compare_cycles(data: DataSplit, base: Fits, best: Fits, reasons: Reasons) -> tuple[Cycles, ...]:
+def compare_cycles(data: DataSplit, base: Fits, best: Fits) -> tuple[Cycles, ...]:
     """Return the errors in each free run with a full cycle, held-out runs first."""
     cycles = []
     for k, (run, reading) in enumerate(zip(data.runs, data.readings, strict=True)):
-        # An angle computed from an acceleration is too inaccurate.
-        if run.kind != "free" or run.accelerometer is not None:
+        if run.kind != "free":
             continue
         peaks = find_peaks(run.time, run.theta, sigma=reading.sigma, trusted=run.trusted)
         if len(peaks.turned) < FEWEST_PEAKS:
             continue
         errors = {}
         for name, model in ((BEFORE, base), (AFTER, best)):
-            compute = functools.partial(
-                _simulated_peaks, model.fitted, peaks, reading.sigma, run.lab_time_s
-            )
-            simulated = compute_part(reasons, f"cycles.{run.name}.{name}", compute, None)
-            if simulated is not None:
-                errors[name] = errors_of(name, peaks, *simulated)
-        if errors:
-            cycles.append(Cycles(run.name, k not in data.fitted_of, peaks, errors))
+            simulated = _simulated_peaks(model.fitted, peaks, reading.sigma, run.lab_time_s)
+            errors[name] = errors_of(name, peaks, *simulated)
+        cycles.append(Cycles(run.name, k not in data.fitted_of, peaks, errors))
     return tuple(sorted(cycles, key=lambda one: not one.held_out))
 
 

@@ -26,35 +26,16 @@ MODEL: Final = "model"  # Name of the model in table 1
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class RunComparison:
-    """Comparison of a model with one free decay.
+    """Comparison of a model with one free decay."""
 
-    Parameters
-    ----------
-    run : Run
-        The record.
-    sigma : float
-        Noise of the record, rad.
-    start : (float, float)
-        Fitted angle (rad) and velocity (rad/s) at the first free sample.
-    curve : ndarray, shape (2, N)
-        Angle and velocity of the model at each sample, rad and rad/s.
-    residual : ndarray, shape (N,)
-        Measured reading less the model's, rad; 0 at excluded samples.
-    rms : float
-        Root mean square residual of the included samples, rad.
-    peaks : Peaks
-        Peaks of the record.
-    table : Table1
-        Table 1 and figure 7, with one column; the model starts at the first measured peak.
-    """
-
-    run: Run
-    sigma: float
-    start: tuple[float, float]
-    curve: Floats
-    residual: Floats
-    rms: float
-    peaks: Peaks
+    run: Run  #: The record.
+    sigma: float  #: Noise of the record, rad.
+    start: tuple[float, float]  #: Angle (rad) and velocity (rad/s) fitted at the first free sample.
+    curve: Floats  #: Angle and velocity of the model, rad and rad/s, shape (2, N).
+    residual: Floats  #: Measured reading less the model's, rad, shape (N,); 0 at excluded samples.
+    rms: float  #: Root mean square residual of the included samples, rad.
+    peaks: Peaks  #: Peaks of the record.
+    #: Table 1 and figure 7, with one column; the model starts at the first measured peak.
     table: Table1
 
     def __repr__(self) -> str:

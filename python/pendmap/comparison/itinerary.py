@@ -72,8 +72,6 @@ class Ruler(NamedTuple):
         """Return velocities from local cubics, rad/s, shape (N,)."""
         half = max(round(_SWING * self.swing / self.tick), 2)
         width = min(2 * half + 1, (reading.size - 1) // 2 * 2 + 1)
-        if width <= _DEGREE:
-            return np.gradient(reading, self.tick)
         return np.asarray(savgol_filter(reading, width, _DEGREE, deriv=1, delta=self.tick))
 
     def statistics(self, reading: Floats) -> dict[str, float]:
@@ -239,7 +237,7 @@ def steady_state(
     measured, cycles = _folded(time, reading, period, last)
     pairs = [end.cycle.nearest(measured) for end in ends]
     rms, model = min(pairs, key=lambda pair: pair[0], default=(math.inf, measured))
-    if not math.isfinite(rms):
+    if math.isinf(rms):
         return Steady(measured, cycles, ends, None, math.nan, math.nan)
     return Steady(measured, cycles, ends, model, rms, _rms(model.velocity - measured.velocity))
 

@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final
 import numpy as np
 import pandas as pd
 
-from pendmap.comparison.forecast import Cycles, Forecast, Gap, compare_cycles, compare_forecasts
+from pendmap.comparison.forecast import (
+    Cycles,
+    Forecast,
+    Gap,
+    compare_cycles,
+    compare_forecasts,
+    compute_part,
+)
 from pendmap.diagnosis.advice import Advice, advise
 from pendmap.diagnosis.named import NamedEffect, effect_values
 from pendmap.formatting import Estimate
@@ -22,10 +29,10 @@ from pendmap.records.summary import doubt_lines, finding_lines
 from pendmap.signal.robust import Z95
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
     from pendmap.comparison.data import DataSplit
-    from pendmap.comparison.forecast import Reasons
+    from pendmap.comparison.forecast import Part, Reasons
     from pendmap.diagnosis.candidates import Candidate
     from pendmap.diagnosis.scores import Scores
     from pendmap.diagnosis.state import Attempt, ScoredModel
@@ -249,7 +256,7 @@ class Discrepancy(FitResult):
     @functools.cached_property
     def forecasts(self) -> tuple[Forecast, ...]:
         """Forecast error of both models against the horizon, on the records held back."""
-        return compare_forecasts(self.data, self.base.fits, self.best.fits, self.reasons)
+        return self._part("forecast", compare_forecasts)
 
     @functools.cached_property
     def advice(self) -> Advice:
@@ -259,7 +266,12 @@ class Discrepancy(FitResult):
     @functools.cached_property
     def cycles(self) -> tuple[Cycles, ...]:
         """Periods and peaks of each free run, and those of both models."""
-        return compare_cycles(self.data, self.base.fits, self.best.fits, self.reasons)
+        return self._part("cycles", compare_cycles)
+
+    def _part(self, field: str, compared: Callable[..., tuple[Part, ...]]) -> tuple[Part, ...]:
+        """Return a comparison of both models, empty where a motion diverges."""
+        models = self.base.fits, self.best.fits
+        return compute_part(self.reasons, field, lambda: compared(self.data, *models), ())
 
 
 def shape_text(result: Discrepancy, candidate: Candidate) -> str:

@@ -64,8 +64,7 @@ def as_json(result: Discrepancy) -> dict[str, Any]:
                 "held_out": one.held_out,
                 **{
                     f"{what}_percent": {
-                        model: getattr(one.errors.get(model), what, None)
-                        for model in (BEFORE, AFTER)
+                        model: getattr(one.errors[model], what) for model in (BEFORE, AFTER)
                     }
                     for what in ("period_rms", "peak_rms")
                 },

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.identification.fit import fit_runs
-from pendmap.model.rig import own_name
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -38,14 +37,6 @@ class Motion:
     def of(cls, fit: TrajectoryFit) -> Motion:
         """Return the motion of a fitted model."""
         return cls(fit.model, {name: fit[name] for name in OWN if name in fit.estimates})
-
-    def without(self, effect: str) -> Motion:
-        """Return the motion of the pendulum without one of its effects."""
-        parameter = own_name(effect)
-        if parameter is not None:
-            return dataclasses.replace(self, own={**self.own, parameter: 0.0})
-        effects = tuple(e for e in self.model.effects if e.name != effect)
-        return dataclasses.replace(self, model=dataclasses.replace(self.model, effects=effects))
 
 
 def run_forward(

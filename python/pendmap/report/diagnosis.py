@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pendmap import _core
-from pendmap.comparison.forecast import LOST, effect_strength
 from pendmap.diagnosis.advice import DETECTION_PROBABILITY
 from pendmap.diagnosis.result import SAID, as_text, ranking_table, shape_text
 from pendmap.formatting import Estimate, estimate_text, interval
@@ -21,7 +20,6 @@ from pendmap.report.markdown import as_page, markdown_templates
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from pendmap.comparison.forecast import Strength
     from pendmap.diagnosis import Discrepancy
 
 
@@ -53,7 +51,6 @@ def as_markdown(result: Discrepancy, pictures: Mapping[str, str]) -> str:
             left_out=left_out(result.data.experiment, result.data.runs),
             unit=functools.partial(unit_of, definition=result.definition),
             shape=functools.partial(shape_text, result),
-            strength_of=functools.partial(_strength, result),
             ranking=ranking_table(result),
             estimate_text=estimate_text,
             interval=interval,
@@ -86,14 +83,6 @@ def as_html(result: Discrepancy, pictures: Mapping[str, bytes]) -> str:
         for name, content in pictures.items()
     }
     return as_page(as_markdown(result, embedded))
-
-
-def _strength(result: Discrepancy, effect: str) -> Strength | str:
-    """Return the strength of an effect over the records, or the reason why it is not computed."""
-    try:
-        return effect_strength(result.best.fitted.fit, result.data.fitted, effect)
-    except LOST as error:
-        return str(error)
 
 
 def _number(value: float, digits: int = 3) -> str:

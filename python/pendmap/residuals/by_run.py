@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats
 
 CHANCE: Final = 1e-3  # Probability by noise alone below which a parameter differs between runs
-
 BLIND: Final = 1e-9
 """Information, over a run's greatest, below which a direction of parameters is undetermined."""
 

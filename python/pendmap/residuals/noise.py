@@ -50,38 +50,24 @@ if TYPE_CHECKING:
 
 
 CERTAIN: Final = 1e9  # Number of amplitudes that represents an exactly known noise level
-
 ARITHMETIC: Final = 1e-4
 """Mean squared residual, in standard errors squared, below which residuals are rounding errors."""
-
 BINS: Final = 256  # Bins of frequency from 0 to half the sampling rate
-
 PHASES: Final = np.pi * (np.arange(BINS) + 0.5) / BINS
 """Frequency at the middle of each bin, rad/sample."""
-
 HARMONICS: Final = 4.0
 """Upper edge of the slow band, where model errors appear, over the swing or rotation frequency."""
-
 GAP: Final = 1.5
 """Lower edge of the quick band, where only noise appears, over the upper edge of the slow band."""
-
 WIDEST: Final = 0.4  # Greatest upper edge of the slow band, over the Nyquist frequency
-
 STATES: Final = 2  # Initial conditions fitted in each window: angle and velocity
-
 LEAST: Final = 8  # Fewest samples of a window for which a spectrum is computed
-
 COLOURS: Final = np.tanh(np.linspace(-1.5, 2.0, 101))  # Correlations ``rho`` of the laws
-
 FLOORS: Final = np.concatenate([[0.0], np.geomspace(0.03, 50.0, 35)])  # Ratios ``phi`` of the laws
-
 RARE: Final = 0.0025  # Prior odds of all coloured laws together against white noise
-
 FAINT: Final = 1e-6
 """Probability of a law, relative to the most probable one, below which it is discarded."""
-
 COUNTED: Final = 10.0  # Prior odds of white noise from rounding alone against any other level
-
 OWN: Final = 50  # Fewest amplitudes from which a run's own noise level is estimated
 
 

@@ -26,16 +26,11 @@ if TYPE_CHECKING:
 
 
 KEPT: Final = 4  # Number of frequencies or instants returned; fewest readings of a window
-
 FINE: Final = 4  # Oversampling of the frequency grid, relative to one over the records' duration
-
 MOST: Final = 1 << 18  # Most frequencies tried
-
 GROWTH: Final = 30.0
 """Growth of initial deviations, over the least of all windows, up to which a window is used."""
-
 LOOKED_AT: Final = 4  # Number of frequencies whose exact gain is computed, over KEPT
-
 DRAWS: Final = 32  # Noise samples from which the variance of the products is estimated
 
 

@@ -41,17 +41,12 @@ OVER: Final = {
     "lab_time": "s",
 }
 """Quantities against which the torque is computed, with their units."""
-
 ALONG: Final = ("amplitude", "lab_time")
 """Quantities with the torque along the motion, positive if it adds energy."""
-
 BINS: Final = 10  # Number of bins of a quantity, with equally many samples each
-
 STANDS_OUT: Final = 4.0  # Standard errors above which a bin is significant; 0.3 % for fifty bins
-
 BLIND: Final = 1e-5
 """Information of a combination of bins, over the greatest, below which it is undetermined."""
-
 LOST: Final = 1e-6  # ``W`` over its greatest below which the integrand is set to 0
 
 

@@ -95,7 +95,7 @@ def local_fit(
         block = uneven[start : start + _BLOCK]
         rows = middle[block, None] + offsets
         lag = (time[rows] - time[middle[block], None]) / interval
-        residual[block], slope[block] = _uneven(lag, theta[rows] - here[block, None], degree)
+        residual[block], slope[block], _ = _uneven(lag, theta[rows] - here[block, None], degree)
         slope[block] /= interval
     good = ~across & np.isfinite(residual) & np.isfinite(slope)
     return LocalFit(middle[good], residual[good], slope[good], reach, spread, shares)
@@ -112,23 +112,27 @@ def even_weights(degree: int, points: int) -> tuple[Floats, Floats]:
     return weights, inverse[1] / half
 
 
-def _uneven(lag: Floats, theta: Floats, degree: int) -> tuple[Floats, Floats]:
-    """Return residual over its gain, and slope, of uneven windows, shape (M, points)."""
+def _uneven(lag: Floats, theta: Floats, degree: int) -> tuple[Floats, Floats, Floats]:
+    """Return residual over its gain, slope at lag 0 and the slope's error for unit noise.
+
+    ``lag`` and ``theta`` are those of the samples of each window, shape (M, points).
+    """
     half = theta.shape[1] // 2
     width = np.maximum(np.max(np.abs(lag), axis=1), 1e-12)
     x = lag / width[:, None]
     powers = x[:, :, None] ** np.arange(degree + 1)
     q, r = np.linalg.qr(powers)
+    right = np.einsum("mpk,mp->mk", q, theta)
     middle = q[:, half, :]
-    fitted = np.einsum("mk,mpk,mp->m", middle, q, theta)
     gain = np.sqrt(np.maximum(1.0 - np.einsum("mk,mk->m", middle, middle), 1e-6))
     diagonal = np.abs(np.einsum("mkk->mk", r))
     sound = np.min(diagonal, axis=1) > 1e-9 * np.max(diagonal, axis=1)
-    slope = np.full(theta.shape[0], np.nan)
-    right = np.einsum("mpk,mp->mk", q[sound], theta[sound])
-    slope[sound] = np.linalg.solve(r[sound], right[:, :, None])[:, 1, 0] / width[sound]
-    residual = np.where(sound, (theta[:, half] - fitted) / gain, np.nan)
-    return residual, slope
+    slope, stderr = np.full((2, theta.shape[0]), np.nan)
+    rows = np.linalg.inv(r[sound])[:, 1, :] / width[sound, None]
+    slope[sound] = np.einsum("mk,mk->m", rows, right[sound])
+    stderr[sound] = np.linalg.norm(rows, axis=1)
+    fitted = np.einsum("mk,mk->m", middle, right)
+    return np.where(sound, (theta[:, half] - fitted) / gain, np.nan), slope, stderr
 
 
 @dataclasses.dataclass(frozen=True)
@@ -233,26 +237,9 @@ def smoothed_velocity(time: Floats, theta: Floats, half: float) -> tuple[Floats,
     odd = np.flatnonzero(uneven)
     for begin in range(0, odd.size, _BLOCK):
         some = odd[begin : begin + _BLOCK]
-        slope[some], stderr[some] = _slopes(time, theta, some, width, scale)
+        # Samples near an end use the first or the last whole window.
+        first = np.clip(some - reach, 0, time.size - width)
+        within = first[:, None] + np.arange(width)
+        lag = time[within] - time[some, None]
+        _, slope[some], stderr[some] = _uneven(lag, theta[within], _DEGREE)
     return slope, stderr
-
-
-def _slopes(
-    time: Floats, theta: Floats, at: Indices, width: int, scale: float
-) -> tuple[Floats, Floats]:
-    """Return slopes and their errors at some samples, each from an uneven window."""
-    # Samples near an end use the first or the last whole window.
-    first = np.clip(at - width // 2, 0, time.size - width)
-    within = first[:, None] + np.arange(width)
-    s, x = (time[within] - time[at, None]) / scale, theta[within]
-    sums, moments = np.empty((at.size, 2 * _DEGREE + 1)), np.empty((at.size, _DEGREE + 1))
-    power = np.ones_like(s)
-    for k in range(2 * _DEGREE + 1):
-        sums[:, k] = power.sum(axis=1)
-        if k <= _DEGREE:
-            moments[:, k] = np.einsum("ij,ij->i", power, x)
-        power *= s
-    order = np.arange(_DEGREE + 1)
-    normal = np.linalg.inv(sums[:, order[:, None] + order])
-    slope = np.sum(normal[:, 1, :] * moments, axis=1) / scale
-    return slope, np.sqrt(np.maximum(normal[:, 1, 1], 0.0)) / scale

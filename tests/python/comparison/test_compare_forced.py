@@ -15,7 +15,7 @@ from driven_decays import motion
 from pendmap import InputError, Rig, virtual_rig
 from pendmap.comparison import Ensemble, compare
 from pendmap.comparison.forced import Statistic, drawn_starts, simulated_readings
-from pendmap.comparison.itinerary import Cycle
+from pendmap.comparison.itinerary import NEVER, Cycle, Ruler, wells
 from pendmap.identification.runs import FitRun
 from pendmap.records import Experiment, Run, read_experiment
 from pendmap.virtual_rig import RunPlan
@@ -27,18 +27,15 @@ if TYPE_CHECKING:
 
 RIG = Rig(w0=6.2, c_over_m=0.3, Tr=0.08)
 DRIVE = {"p": 0.6, "Omega": 12.0, "phi": 0.4}
+TICK, PERIOD, NEAR = 0.01, 0.73, 0.05
+RULER = Ruler(TICK, 1.0, PERIOD, 0.001)
+TIME = np.arange(0, 40, TICK)
 
 
-def made(folder: Path, *plans: RunPlan, effects: tuple[str, ...] = ("none",)) -> Experiment:
+def made(folder: Path, *plans: RunPlan) -> Experiment:
+    damping = {"w0": RIG.w0, "c_over_m": RIG.c_over_m, "friction": RIG.Tr}
     request = virtual_rig.Request(
-        preset="forced",
-        effects=effects,
-        w0=RIG.w0,
-        c_over_m=RIG.c_over_m,
-        friction=RIG.Tr,
-        noise=0.1,
-        rate=50.0,
-        plans=plans,
+        "forced", effects=("none",), noise=0.1, rate=50.0, plans=plans, **damping
     )
     where = virtual_rig.places(folder / "lab", replace=True)
     virtual_rig.write(virtual_rig.make(request), where)
@@ -50,22 +47,16 @@ def forced(theta: float, velocity: float, seconds: float, **drive: float) -> Run
     return RunPlan("forced", theta, velocity, seconds, **given)
 
 
-@pytest.mark.parametrize("effects", [(), (("encoder_offset", {"d": 0.02}),)])
-def test_members_are_trajectories_of_the_model(
-    effects: tuple[tuple[str, dict[str, float]], ...],
-) -> None:
+def test_members_are_trajectories_of_the_model() -> None:
     """Members equal ``simulate`` from the same start, plus the error of the sensor."""
-    own = tuple(pendmap.Effect(name, values) for name, values in effects)
-    rig = dataclasses.replace(RIG, effects=own)
+    rig = dataclasses.replace(RIG, effects=(pendmap.Effect("encoder_offset", {"d": 0.02}),))
     driven = dataclasses.replace(rig, p=0.6, Omega=12.0, phi=0.4)
     run = pendmap.simulate(driven, 1.0, -2.0, 6.0, samples=32)
     time = run["time"].values
     record = FitRun(time, np.zeros_like(time), 1e-3, drive=DRIVE)
-    starts = np.array([1.0, 1.0]), np.array([-2.0, 0.0])
-    found = simulated_readings(record, rig, starts, time, None)
-    offset = 0.02 if effects else 0.0
-    np.testing.assert_allclose(found[0] - offset, run["theta"].values, atol=2e-7)
-    assert np.abs(found[1] - found[0]).max() > 0.1
+    one, other = simulated_readings(record, rig, np.array([[1.0, 1.0], [-2.0, 0.0]]), time, None)
+    np.testing.assert_allclose(one - 0.02, run["theta"].values, atol=2e-7)
+    assert np.abs(other - one).max() > 0.1
 
 
 def test_the_error_of_the_start_follows_from_the_noise(tmp_path: Path) -> None:
@@ -105,47 +96,41 @@ def test_statistics_accept_the_true_model_and_reject_another(tmp_path: Path) -> 
 def test_a_steady_state_is_the_models_orbit(
     start: tuple[float, float], name: str, tmp_path: Path
 ) -> None:
-    """The orbit equals that found by Newton's method; more damping makes a smaller oscillation."""
+    """The orbit equals that found by Newton's method."""
     experiment = made(tmp_path, forced(*start, 90.0))
     one = compare(RIG, experiment, ensemble=Ensemble(members=30, spread=0.002)).forced[0]
-    found = one.steady
-    assert found is not None
-    assert repr(one).endswith(f"; {name}>")
-    assert [(r.cycle.name, r.share) for r in found.reached] == [(name, 1.0)]
-    assert found.rms < 3e-3
-    assert found.rms_velocity < 0.05
-    assert abs(found.overestimate) < 3e-3
-    n, w = found.measured.n, found.measured.w
+    steady = one.steady
+    assert steady is not None
+    assert [(r.cycle.name, r.share) for r in steady.reached] == [(name, 1.0)]
+    assert steady.rms < 3e-3
+    assert steady.rms_velocity < 0.05
+    assert abs(steady.overestimate) < 3e-3
+    n, w = steady.measured.n, steady.measured.w
     driven = dataclasses.replace(RIG, **DRIVE)  # type: ignore[arg-type]
     box = pendmap.Grid(pendmap.Axis(-math.pi, math.pi, 120), pendmap.Axis(-18, 18, 120))
     orbits = pendmap.orbit(driven, n, w, box)
     stable = orbits.isel(orbit=np.flatnonzero(orbits["stable"].values))
-    assert found.model is not None
-    ours = [(found.model.theta[0] + math.pi) % math.tau - math.pi, found.model.velocity[0]]
+    assert steady.model is not None
+    ours = [(steady.model.theta[0] + math.pi) % math.tau - math.pi, steady.model.velocity[0]]
     points = zip(stable["point_theta"].values, stable["point_velocity"].values, strict=True)
     nearest = min(points, key=lambda point: math.dist(ours, point))
     assert ours[0] == pytest.approx(nearest[0], abs=3e-4)
     # Friction has a kink at each turning point, which twelve harmonics resolve poorly.
     assert ours[1] == pytest.approx(nearest[1], abs=3e-3)
-    if name.startswith("oscillation"):
-        damped = dataclasses.replace(RIG, c_over_m=1.2)
-        less = compare(damped, experiment, ensemble=Ensemble(members=30, spread=0.002)).forced[0]
-        assert less.steady is not None
-        assert less.steady.overestimate < -0.01
 
 
 def test_a_different_steady_state_is_reported(tmp_path: Path) -> None:
     experiment = made(tmp_path, forced(0.2, 14.5, 60.0))
     stiff = dataclasses.replace(RIG, c_over_m=6.0)  # no rotation lasts
     comparison = compare(stiff, experiment, ensemble=Ensemble(members=20))
-    found = comparison.forced[0].steady
-    assert found is not None
-    assert found.model is None
-    assert math.isnan(found.rms)
-    said = str(comparison)
-    assert "settles on rotation 1:+1; the model on" in said
-    assert "not on the measured one" in said
-    assert "The model describes 0 of 1 run" in said
+    steady = comparison.forced[0].steady
+    assert steady is not None
+    assert steady.model is None
+    assert math.isnan(steady.rms)
+    text = str(comparison)
+    for part in ("settles on rotation 1:+1; the model on", "not on the measured", "0 of 1 run"):
+        assert part in text
+    assert "escapes from a well" in text
 
 
 def test_an_unknown_phase_is_found_and_a_recorded_pivot_drives(tmp_path: Path) -> None:
@@ -163,19 +148,15 @@ def test_an_unknown_phase_is_found_and_a_recorded_pivot_drives(tmp_path: Path) -
     up = 9.81 * np.array([pivot(t)[0] for t in time])
     recorded = dataclasses.replace(run, drive=None, pivot={"vertical": up}, pivot_unit="m/s2")
     few = Ensemble(members=40)
-    found = compare(rig, Experiment(tmp_path, (run, unknown, recorded)), ensemble=few).forced
-    for one in found:
+    three = compare(rig, Experiment(tmp_path, (run, unknown, recorded)), ensemble=few).forced
+    for one in three:
         assert one.rms == pytest.approx(1e-3, rel=0.1)
-        assert (one.phase is None) == (one is not found[1])
+        assert (one.phase is None) == (one is not three[1])
         assert min(s.chance for s in one.statistics) > 0.01
-    for one, other in zip(found[0].statistics, found[1].statistics, strict=True):
-        assert one.measured == other.measured
-        if one.name in {"angle covered", "greatest velocity"}:
-            assert one.median == pytest.approx(other.median, rel=2e-3)
-    assert found[1].phase is not None
-    assert found[1].phase.value == pytest.approx(0.4, abs=1e-3)
-    assert found[2].steady is None
-    assert math.isinf(found[2].statistics[3].measured)  # driven without a period: no rest
+    assert three[1].phase is not None
+    assert three[1].phase.value == pytest.approx(0.4, abs=1e-3)
+    assert three[2].steady is None
+    assert math.isinf(three[2].statistics[3].measured)  # driven without a period: no rest
 
 
 def test_runs_that_cannot_be_compared_are_left_out_with_a_reason(tmp_path: Path) -> None:
@@ -189,20 +170,94 @@ def test_runs_that_cannot_be_compared_are_left_out_with_a_reason(tmp_path: Path)
     short = dataclasses.replace(
         lost, name="short", time=time[:9], theta=theta[:9], trusted=trusted[:9], drive=DRIVE
     )
-    found = compare(RIG, Experiment(tmp_path, (free, lost, still, short)))
-    assert [one.run.name for one in found.every] == ["free"]
-    why = dict(found.left_out)
+    result = compare(RIG, Experiment(tmp_path, (free, lost, still, short)))
+    assert [one.run.name for one in result.every] == ["free"]
+    why = dict(result.left_out)
     assert why["lost"] == "neither its drive nor its pivot is given"
     assert why["still"] == "nothing moves in it"
     assert "too short: 9 samples over 0.16 s" in why["short"]
-    assert "lost: not compared: neither its drive nor its pivot is given" in str(found)
+    assert "lost: not compared: neither its drive nor its pivot is given" in str(result)
     with pytest.raises(InputError, match="no run can be compared: lost: neither its drive"):
         compare(RIG, Experiment(tmp_path, (lost,)))
-    # The model's own drive has no part in a free decay.
-    driven = compare(dataclasses.replace(RIG, p=0.8, Omega=12.0), Experiment(tmp_path, (free,)))
-    assert driven.runs[0].errors is not None
-    assert found.runs[0].errors is not None
-    assert driven.runs[0].errors.peak_rms == found.runs[0].errors.peak_rms < 1
+
+
+@pytest.mark.parametrize(
+    ("given", "text"),
+    [
+        ({"members": 5}, "members must be a whole number from 20 to 100000, got 5"),
+        ({"spread": math.nan}, "spread"),
+        ({"spread": -1.0}, "spread must be a number from 0 to 1 rad, got -1"),
+        ({"seed": -1}, "seed must be .*, got -1"),
+    ],
+)
+def test_ensembles_out_of_range_are_refused(given: dict[str, float], text: str) -> None:
+    with pytest.raises(InputError, match=text):
+        Ensemble(**given)  # type: ignore[arg-type]
+
+
+def test_the_command_compares_both_kinds_of_run(tmp_path: Path, pendmap_command: Command) -> None:
+    made(tmp_path, RunPlan("free", 1.5, 0.0, 10.0), forced(0.9, 0.0, 15.0))
+    (tmp_path / "m.toml").write_text("[pendulum]\nw0 = 6.2\nc_over_m = 0.3\nTr = 0.08\n")
+    words = ("compare", "m.toml", "lab", "--members", 50)
+    run = pendmap_command(*words, "--json")
+    assert run.returncode == 0, run.stderr
+    first, second = json.loads(run.stdout)["runs"]
+    assert (first["kind"], second["kind"]) == ("free", "forced")
+    assert second["members"] == 50
+    what = {row["quantity"]: row for row in second["quantities"]}
+    assert what["wells visited"]["record"] == 1
+    assert what["time to settle"]["record"] is None
+    assert 0 < what["greatest velocity"]["chance"] <= 1
+    assert second["drive"] == {"p": 0.6, "Omega": 12.0, "phi": 0.4}
+    again = json.loads(pendmap_command(*words, "--json", "--threads", 1).stdout)["runs"][1]
+    assert again == second
+
+
+# Statistics of paths between wells, for paths with known itineraries.
+
+
+def test_passages_between_wells_are_counted() -> None:
+    # Up two wells, back one, and twice round: 7 passages through 6 wells.
+    visited = [0, 1, 2, 1, 0, -1, -2, -3]
+    path = np.repeat(math.tau * np.array(visited, float), TIME.size // len(visited))
+    counts = RULER.statistics(path)
+    assert (counts["escapes from a well"], counts["wells visited"]) == (7, 6)
+    assert counts["angle covered"] == pytest.approx(5 * math.tau)
+    assert wells(path).tolist()[:: TIME.size // len(visited)] == visited
+    # Noise at the top is no escape; a jump over wells is several.
+    near_top = math.pi + np.random.default_rng(1).normal(0, 0.02, TIME.size)
+    near_top[0] = 0.0
+    assert RULER.statistics(near_top)["escapes from a well"] == 0
+    over = RULER.statistics(np.where(TIME < 20, 0.3, 0.3 + 3 * math.tau))
+    assert (over["escapes from a well"], over["wells visited"]) == (3, 2)
+
+
+@pytest.mark.parametrize(("n", "w"), [(1, 0), (1, 1), (2, -1), (8, 3)])
+def test_a_cycle_has_its_period_and_turns(n: int, w: int) -> None:
+    rate = math.tau / (n * PERIOD)
+    cycle = 0.8 * np.sin(rate * TIME) + 0.3 * np.cos((2 * n - 1) * rate * TIME)
+    path = cycle + w * rate * TIME + np.random.default_rng(2).normal(0, 0.001, TIME.size)
+    assert RULER.cycling(path) == (n, w, 0)
+
+
+def test_the_time_to_settle_is_that_of_the_slowest_part() -> None:
+    """A difference ``a exp(-k t)`` from the cycle changes by 0.05 a period at a known time."""
+    rate, decay, apart = math.tau / PERIOD, 0.25, 1.5
+    path = 0.5 * np.sin(rate * TIME) + apart * np.exp(-decay * TIME)
+    expected = math.log(apart * (1 - math.exp(-decay * PERIOD)) / NEAR) / decay
+    n, w, since = RULER.cycling(path)
+    assert (n, w) == (1, 0)
+    assert since == pytest.approx(expected, abs=2 * TICK)
+    walk = 0.1 * np.cumsum(np.random.default_rng(3).normal(0, 1, TIME.size))
+    assert RULER.cycling(walk) == NEVER
+    # Five periods are required, and fewer than two are present.
+    assert RULER.cycling(np.where(TIME < 39, walk, 0.0)) == NEVER
+    # Without a period only rest counts as settled.
+    ruler = Ruler(TICK, 1.0, None, 0.001)
+    stays = np.exp(-0.5 * TIME) * np.cos(6 * TIME) + math.tau
+    last = TIME[np.flatnonzero(np.abs(stays - stays[-1]) > NEAR)[-1]]
+    assert ruler.cycling(stays) == (1, 0, pytest.approx(last + TICK))
+    assert ruler.cycling(np.sin(6 * TIME)) == NEVER
 
 
 def test_p_values_are_ranks() -> None:
@@ -217,9 +272,8 @@ def test_p_values_are_ranks() -> None:
 def test_cycles_are_aligned_by_shifts_of_periods_and_turns() -> None:
     x = np.arange(128) / 128
     one = Cycle.of(2, 0, 1.0, np.sin(math.tau * x) + 0.1 * np.sin(2 * math.tau * x))
-    np.testing.assert_allclose(
-        one.velocity, math.pi * (np.cos(math.tau * x) + 0.2 * np.cos(2 * math.tau * x)), atol=1e-9
-    )
+    velocity = math.pi * (np.cos(math.tau * x) + 0.2 * np.cos(2 * math.tau * x))
+    np.testing.assert_allclose(one.velocity, velocity, atol=1e-9)
     shifted = np.roll(one.theta, -64) + math.tau, np.roll(one.velocity, -64)
     later = dataclasses.replace(one, theta=shifted[0], velocity=shifted[1])
     apart, moved = later.nearest(one)
@@ -231,48 +285,4 @@ def test_cycles_are_aligned_by_shifts_of_periods_and_turns() -> None:
     assert dataclasses.replace(whirling, theta=theta).nearest(whirling)[0] < 1e-9
     turning = Cycle.of(1, 1, 1.0, math.tau * x + 0.2 * np.sin(math.tau * x))
     assert turning.amplitude == pytest.approx(0.2, rel=1e-3)
-    assert turning.name == "rotation 1:+1"
     assert math.isinf(turning.nearest(one)[0])
-    rest = Cycle.of(1, 0, 1.0, math.pi + 0.001 * np.sin(math.tau * x))
-    assert rest.name == "inverted rest"
-
-
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
-        ({"members": 5}, "members must be a whole number from 20 to 100000, got 5"),
-        ({"spread": -1.0}, "spread must be a number from 0 to 1 rad, got -1"),
-        ({"spread": math.nan}, "spread"),
-        ({"seed": -1}, "seed must be .*, got -1"),
-    ],
-)
-def test_ensembles_out_of_range_are_refused(given: dict[str, float], said: str) -> None:
-    with pytest.raises(InputError, match=said):
-        Ensemble(**given)  # type: ignore[arg-type]
-
-
-def test_the_command_compares_both_kinds_of_run(tmp_path: Path, pendmap_command: Command) -> None:
-    made(tmp_path, RunPlan("free", 1.5, 0.0, 10.0), forced(0.9, 0.0, 15.0))
-    (tmp_path / "m.toml").write_text("[pendulum]\nw0 = 6.2\nc_over_m = 0.3\nTr = 0.08\n")
-    words = ("compare", "m.toml", "lab", "--members", 50)
-    run = pendmap_command(*words, "--plot", "c.png")
-    assert run.returncode == 0, run.stderr
-    for text in ("escapes from a well", "95 % of ensemble", "peaks, rms", "Written: c.png"):
-        assert text in run.stdout
-    assert (tmp_path / "c.png").stat().st_size > 50_000
-    first, second = json.loads(pendmap_command(*words, "--json").stdout)["runs"]
-    assert (first["kind"], second["kind"]) == ("free", "forced")
-    assert second["members"] == 50
-    what = {row["quantity"]: row for row in second["quantities"]}
-    assert what["wells visited"]["record"] == 1
-    assert what["time to settle"]["record"] is None
-    assert 0 < what["greatest velocity"]["chance"] <= 1
-    assert {"residual", "periods, rms", "peaks, rms"} <= {
-        r["quantity"] for r in first["quantities"]
-    }
-    assert second["drive"] == {"p": 0.6, "Omega": 12.0, "phi": 0.4}
-    again = json.loads(pendmap_command(*words, "--json", "--threads", 1).stdout)["runs"][1]
-    assert again == second
-    run = pendmap_command("compare", "m.toml", "lab", "--members", 3)
-    assert run.returncode == 2
-    assert "members" in run.stderr

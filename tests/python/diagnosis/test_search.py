@@ -1,235 +1,110 @@
-"""The search: its fits, their caching, and the acceptance of effects."""
+"""The search for effects, its verdict, the probabilities of names, and advice."""
 
 from __future__ import annotations
 
 import dataclasses
+import functools
+import importlib
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
+from scipy.special import chdtri
 
+import pendmap
 from driven_decays import motion
-from hidden import recorded
-from pendmap import FitDiverged, InputError
+from hidden import diagnosed, once, recorded
+from pendmap import InputError
 from pendmap.comparison.data import DataSplit, split_records
+from pendmap.comparison.forecast import share_closed
 from pendmap.diagnosis import Thresholds, diagnose
+from pendmap.diagnosis.advice import required_gain
 from pendmap.diagnosis.baseline import fit_baseline
-from pendmap.diagnosis.candidates import CORE, Candidate
-from pendmap.diagnosis.fitted_model import fit_with_candidates
-from pendmap.diagnosis.hold_out import hold_out_losses
+from pendmap.diagnosis.candidates import CORE, Candidate, list_candidates
+from pendmap.diagnosis.result import as_text
+from pendmap.diagnosis.scores import Scores, score_candidates
 from pendmap.diagnosis.search import prune_effects, search
-from pendmap.diagnosis.state import State
-from pendmap.diagnosis.verdict import compare_alternatives
+from pendmap.diagnosis.state import ScoredModel, State
+from pendmap.diagnosis.summary import as_json
+from pendmap.diagnosis.verdict import Alternative, Identifiability, decide_verdict, probabilities
 from pendmap.identification.fit import fit_runs
 from pendmap.records import Experiment, Run
+from pendmap.residuals.by_run import parameters_by_run
 
 if TYPE_CHECKING:
+    from pendmap.diagnosis import NamedEffect
     from pendmap.diagnosis.fitted_model import FittedModel
+    from pendmap.diagnosis.verdict import Assessment
     from pendmap.identification.fit import TrajectoryFit
 
-
-def decay(drag: float) -> DataSplit:
-    """Return a free decay made by scipy, with noise of 2 mrad."""
-    time = np.arange(1500) * 0.02
-    theta = motion(time, (2.2, 0.0), w0=6.2, c_over_m=0.05, friction=0.05, drag=drag)
-    theta = theta + np.random.default_rng(1).normal(0, 2e-3, time.shape)
-    run = Run("a", "a.csv", "free", time, theta, np.ones(time.size, bool))
-    return split_records(Experiment(Path("there"), (run,)))
+CHANCE, SURE = Thresholds().rest, Thresholds().sure
+NOISE = np.random.default_rng(1).normal(0, 2e-3, 1500)
 
 
-@pytest.fixture(scope="module")
-def dragged() -> tuple[State, FittedModel | None]:
-    """Return the state of a decay with drag, and its physical core."""
-    data = decay(drag=0.02)
+def decay(start: float, further: np.ndarray = NOISE, drag: float = 0.02) -> Run:
+    """Return a free decay by scipy with a further reading."""
+    time = np.arange(further.size) * 0.02
+    theta = motion(time, (start, 0.0), w0=6.2, c_over_m=0.05, friction=0.05, drag=drag)
+    return Run(f"{start}", "a.csv", "free", time, theta + further, np.ones(time.size, bool))
+
+
+def state_of(*runs: Run) -> tuple[State, FittedModel | None]:
+    """Return the state of a search in free decays, and their physical core."""
+    data = split_records(Experiment(Path("there"), runs))
     base, core = fit_baseline(data)
     return State(data, base, Thresholds(), 3, ()), core
 
 
 @pytest.fixture(scope="module")
-def best(dragged: tuple[State, FittedModel | None]) -> FittedModel:
-    return search(*dragged)
-
-
-def test_the_core_is_fitted_in_addition_to_the_given_model(
-    dragged: tuple[State, FittedModel | None],
-) -> None:
-    state, core = dragged
+def dragged() -> tuple[State, FittedModel, FittedModel]:
+    """Return the state of a decay with drag, its physical core, and the best model."""
+    state, core = state_of(decay(2.2))
     assert core is not None
-    assert set(core.names) == set(CORE)
-    assert state.base.chosen == ()
-    q = core.fit.estimates["quadratic_drag.q"]
-    assert abs(q.value - 0.02) < 4 * q.stderr
-    assert core.chi2 < state.base.chi2 - 100
-    _, none = fit_baseline(state.records, without=CORE)
-    assert none is None
+    return state, core, search(state, core)
+
+
+@pytest.fixture(scope="module")
+def waving() -> tuple[State, ScoredModel]:
+    """Return decays with drag, and a wave in the readings that no effect describes."""
+    wave = {start: 6e-3 * np.sin(np.arange(1500) * 0.02 * (1 + start)) for start in (2.2, 1.4)}
+    state, core = state_of(*(decay(start, NOISE + wave[start]) for start in wave))
+    return state, state.scored(search(state, core))
+
+
+def judged(state: State, best: ScoredModel) -> Assessment:
+    fitted = best.fitted
+    runs = parameters_by_run(state.data.fitted, fitted.fit, fitted.noise, fitted.level)
+    return decide_verdict(state, best, runs, 1.0)
 
 
 def test_a_search_keeps_the_true_effect_and_drops_the_others_of_the_core(
-    dragged: tuple[State, FittedModel | None], best: FittedModel
+    dragged: tuple[State, FittedModel, FittedModel],
 ) -> None:
-    state, core = dragged
-    assert best.names == ("quadratic_drag",)
-    assert state.chance(state.base, best) < state.thresholds.chance
-    assert core is not None
-    assert state.chance(best, core) > state.thresholds.chance
-    # Pruning of the core gives the same effects.
-    assert prune_effects(state, core).names == ("quadratic_drag",)
-
-
-def test_the_same_model_is_fitted_once(
-    dragged: tuple[State, FittedModel | None], best: FittedModel, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    state, _ = dragged
-    (drag,) = best.chosen
-    scores = state.scores(state.base)
-    place = next(k for k in scores.best() if scores.scores[k].candidate.name == "cubic_damping")
-    first = (
-        state.refit(state.base, [place]),
-        state.leave_out(best, drag),
-        state.hold_out_losses(best),
-    )
-    assert first[0] is not None
-    assert first[1] is not None
-    for name in (
-        "refit_with",
-        "drop_effect",
-        "evaluate_hold_out",
-        "hold_out_losses",
-        "score_candidates",
-    ):
-        monkeypatch.setattr(f"pendmap.diagnosis.state.{name}", pytest.fail)
-    again = (
-        state.refit(state.base, [place]),
-        state.leave_out(best, drag),
-        state.hold_out_losses(best),
-    )
-    assert all(one is other for one, other in zip(first, again, strict=True))
-    assert state.scores(state.base) is scores
-
-
-def test_a_fit_that_diverges_is_no_candidate(
-    dragged: tuple[State, FittedModel | None], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    state, _ = dragged
-
-    def lost(*_given: object, **_named: object) -> FittedModel:
-        raise FitDiverged("lost")
-
-    monkeypatch.setattr("pendmap.diagnosis.fitted_model.fit_model", lost)
-    other = State(state.records, state.base, state.thresholds, 3, ())
-    assert other.refit(state.base, [0]) is None
-    assert search(other, None).chosen == ()
-
-
-def test_an_error_of_a_fit_is_not_taken_for_divergence(
-    dragged: tuple[State, FittedModel | None], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    state, _ = dragged
-
-    def wrong(*_given: object, **_named: object) -> FittedModel:
-        raise InputError("free must be among the parameters")
-
-    monkeypatch.setattr("pendmap.diagnosis.refit.fit_with_candidates", wrong)
-    with pytest.raises(InputError, match="free must be"):
-        State(state.records, state.base, state.thresholds, 3, ()).refit(state.base, [0])
+    state, core, best = dragged
+    assert set(core.names) == set(CORE)
+    q = core.fit.estimates["quadratic_drag.q"]
+    assert abs(q.value - 0.02) < 4 * q.stderr
+    assert best.names == prune_effects(state, core).names == ("quadratic_drag",)
+    assert state.chance(state.base, best) < state.thresholds.chance < state.chance(best, core)
+    # A model that loses on held-out records is refused.
+    assert state.keeps_hold_out(state.base, best)
+    assert not state.keeps_hold_out(best, state.base)
 
 
 def test_no_effect_is_accepted_that_noise_explains() -> None:
-    data = decay(drag=0.0)
-    base, core = fit_baseline(data)
-    state = State(data, base, Thresholds(), 3, ())
+    state, core = state_of(decay(2.2, drag=0.0))
     assert search(state, core).chosen == ()
     # Thresholds that accept everything accept the best candidate.
     lax = Thresholds(chance=2.0, alike=0.0, closes=0.0, loss=math.inf)
-    state = State(data, base, lax, 1, CORE)
-    assert search(state, None).chosen != ()
-
-
-def test_a_model_that_loses_on_held_out_records_is_refused(
-    dragged: tuple[State, FittedModel | None], best: FittedModel
-) -> None:
-    state, _ = dragged
-    assert state.keeps_hold_out(state.base, best)
-    assert not state.keeps_hold_out(best, state.base)
-    held = state.hold_out(best)
-    assert held is not None
-    # Stretches within the run, its first and its last third.
-    assert len(hold_out_losses(state.data, best, held, state.level)) == 3
-
-
-def test_alternatives_have_the_difference_of_gains(
-    dragged: tuple[State, FittedModel | None], best: FittedModel
-) -> None:
-    state, _ = dragged
-    (drag,) = best.chosen
-    each = compare_alternatives(state, best, drag)
-    rest = state.leave_out(best, drag)
-    assert each.gain == pytest.approx((rest.chi2 - best.chi2) / best.level)
-    assert 0.9 < each.closed <= 1.1
-    behind = {r.candidate.name: r for r in each.alternatives}
-    assert behind["power_law_drag"].contains
-    cubic = behind["cubic_damping"]
-    assert cubic.gain + cubic.behind == pytest.approx(each.gain)
-    assert cubic.alike is (cubic.behind < state.thresholds.alike)
-
-
-def test_a_model_without_an_effect_is_never_worse_than_one_with_fewer(
-    dragged: tuple[State, FittedModel | None], best: FittedModel, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    known, _ = dragged
-    (drag,) = best.chosen
-    gain = Candidate("encoder_gain")
-    both = fit_with_candidates(known.data, best, [gain], {gain.free[0]: 0.0}, level=known.level)
-    right = known.leave_out(both, gain)
-    # The fit without the gain diverges; the drag is added to the given model instead.
-    monkeypatch.setattr("pendmap.diagnosis.state.drop_effect", lambda *_: None)
-    state = State(known.records, known.base, known.thresholds, 3, ())
-    state.data = known.data
-    rest = state.leave_out(both, gain)
-    assert rest.names == ("quadratic_drag",)
-    assert rest.chi2 == pytest.approx(right.chi2, rel=1e-3)
-    # Where that fit diverges too, the given model is the best one without the gain.
-    monkeypatch.setattr("pendmap.diagnosis.state.add_effects", lambda *_: None)
-    state = State(known.records, known.base, known.thresholds, 3, ())
-    assert state.leave_out(both, gain) is known.base
-    assert state.leave_out(best, drag) is known.base
-
-
-def test_a_fit_that_promises_far_less_than_its_target_is_given_up() -> None:
-    data = split_records(recorded("quadratic_drag", noise=0.03, free=4, forced=0)[0])
-    base, _ = fit_baseline(data)
-    model = dataclasses.replace(base.fit.model, c_over_m=1.05 * base.fit.model.c_over_m)
-    start = {"c_over_m": model.c_over_m}
-
-    def fit(target: float) -> tuple[bool, bool, int, float]:
-        found = fit_runs(
-            data.fitted,
-            model,
-            base.free,
-            start=start,
-            windows=base.fit.windows,
-            profiled=(),
-            target=target,
-        )
-        return found.given_up, found.converged, found.steps, found.chi2
-
-    whole = fit(math.inf)
-    assert whole[:2] == (False, True)
-    assert whole[3] == pytest.approx(base.chi2, rel=1e-6)
-    given_up, converged, steps, chi2 = fit(0.5 * base.chi2)
-    assert (given_up, converged) == (True, False)
-    assert steps < whole[2]
-    assert chi2 < 1.2 * base.chi2
-    assert fit(1.01 * base.chi2) == whole
+    assert search(State(state.records, state.base, lax, 1, CORE), None).chosen != ()
 
 
 def test_a_diagnosis_whose_fit_does_not_converge_is_refused(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    data = split_records(recorded("quadratic_drag", noise=0.03, free=4, forced=0)[0])
-
     def stopped(*given: Any, **named: Any) -> TrajectoryFit:  # noqa: ANN401 (of fit_runs)
         # Each search lowers the sum of squares by a half, and stops.
         fit, before = fit_runs(*given, **named), chi2[0]
@@ -239,21 +114,251 @@ def test_a_diagnosis_whose_fit_does_not_converge_is_refused(
     chi2 = [1e9]
     monkeypatch.setattr("pendmap.diagnosis.fitted_model.fit_runs", stopped)
     with pytest.raises(InputError, match="must converge, got one whose sum"):
-        diagnose(data.experiment, max_effects=0)
+        diagnose(decay(2.2), max_effects=0)
 
 
-def test_a_fit_converges_where_the_pendulum_comes_to_rest() -> None:
-    # A forced run comes to rest at the limit of friction: in its last windows the sum of squares
-    # has its minimum at a kink.
-    given = {"seed": 4, "free": 5, "forced": 4, "noise": 0.1, "counts": 4096, "rate": 124.0}
-    data = split_records(recorded("quadratic_drag", **given)[0])
-    _, core = fit_baseline(data)
-    assert core is not None
-    still = [
-        float(np.ptp(run.theta[first:last]))
-        for index, first, last, *_ in core.fit.windows
-        if (run := data.fitted[index]).forced
+def test_probability_falls_with_the_misfit_and_with_the_number_of_effects() -> None:
+    by_chance = [probabilities(chance, [300.0])[0] for chance in (1.0, 0.1, 1e-2, 1e-3)]
+    assert by_chance == sorted(by_chance, reverse=True)
+    assert by_chance[0] > SURE > by_chance[-1]
+    by_count = [min(probabilities(0.5, [500.0] * count)) for count in (1, 2, 3)]
+    assert by_count == sorted(by_count, reverse=True)
+    # A weak effect in addition to a strong one is less probable.
+    strong, weak = probabilities(0.5, [2000.0, 20.0])
+    assert strong > weak
+    assert probabilities(0.5, [2000.0, 1500.0])[1] > weak
+    assert min(probabilities(0.0, [1e300, 0.0])) > 0
+
+
+def test_an_effect_outside_the_library_shows_in_the_residuals() -> None:
+    result, _ = diagnosed("encoder_gain", size=3.0, free=3, forced=0, without=("encoder_gain",))
+    assert result.verdict in {"unknown", "partial"}
+    assert result.assessment.form.chance < CHANCE
+
+
+@pytest.mark.parametrize(
+    ("change", "verdict"),
+    [
+        ({}, "partial"),
+        ({"closes": 1.1}, "unknown"),
+        # With residuals ignored the alternatives to the drag, which the wave hides, decide.
+        ({"rest": 0.0}, "ambiguous"),
+    ],
+)
+def test_thresholds_decide_between_partial_unknown_and_ambiguous(
+    change: dict[str, float], verdict: str, waving: tuple[State, ScoredModel]
+) -> None:
+    state, best = waving
+    assert best.fitted.names == ("quadratic_drag",)
+    state.thresholds = Thresholds(**change)  # type: ignore[arg-type]
+    result = judged(state, best)
+    assert result.closed > 0.5
+    assert result.verdict == verdict
+    assert result.approximate is (verdict == "partial" or min(result.probabilities) < SURE)
+
+
+@pytest.mark.parametrize(
+    ("stated", "correlation", "verdict"),
+    [(1.0, 0.0, "none"), (0.7, 0.0, "unknown"), (1.0, 0.6, "none")],
+)
+def test_none_is_said_within_the_noise_only(
+    stated: float, correlation: float, verdict: str
+) -> None:
+    # White residuals above the stated noise are not noise; coloured noise exceeds its local fits.
+    noise = lfilter([math.sqrt(1 - correlation**2)], [1, -correlation], NOISE[:1000])
+    data = split_records(Experiment(Path("there"), (decay(2.2, noise, drag=0.0),)))
+    fitted = tuple(dataclasses.replace(r, sigma=stated * r.sigmas) for r in data.fitted)
+    data = dataclasses.replace(data, fitted=fitted)
+    state = State(data, fit_baseline(data)[0], Thresholds(), 0, ())
+    result = judged(state, state.scored(search(state, None)))
+    assert result.verdict == verdict
+    assert (result.ratio <= result.ratio_allowed) is (verdict == "none")
+
+
+def test_the_share_of_the_gap_is_one_number() -> None:
+    result = once("quadratic_drag", seed=3, size=3.0, free=1, forced=0, max_effects=1)
+    fields, gap = as_json(result), result.gap
+    left, before = (x**2 - gap.noise_floor**2 for x in (gap.after, gap.before))
+    closed = result.assessment.closed
+    assert closed == pytest.approx(min(1.0, 1 - left / before), rel=1e-9)
+    assert fields["gap"]["closed"] == fields["gap"]["closed_by_nearest"] == closed
+    assert [effect["closes"] for effect in fields["effects"]] == [closed]
+    assert f"Share of the squared gap closed: {100 * closed:.0f} %" in list(as_text(result))
+    assert share_closed(2.0, 1.0, 1.0) == share_closed(0.9, 0.8, 1.0) == 1.0
+    assert share_closed(0.9, 1.1, 1.0) == 0.0
+
+
+def test_an_effect_whose_interval_contains_0_is_no_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    module = importlib.import_module("pendmap.diagnosis.diagnose")
+    named, shown = module.name_effects, []
+
+    def widened(*given: object) -> tuple[NamedEffect, ...]:
+        shown.extend(named(*given))
+        wide = [dict.fromkeys(effect.ci95, (-1.0, 1.0)) for effect in shown]
+        return tuple(dataclasses.replace(e, ci95=w) for e, w in zip(shown, wide, strict=True))
+
+    monkeypatch.setattr(module, "name_effects", widened)
+    result = pendmap.diagnose(decay(2.2, NOISE[:600], drag=0.05), max_effects=1)
+    assert shown
+    assert result.effects == ()
+    assert result.verdict == "unknown"
+
+
+@pytest.mark.parametrize(
+    ("rivals", "share", "equivalent"),
+    [
+        ({}, 1.0, ""),
+        # An effect with the name as a special case takes no share.
+        ({"power_law_drag": (0.0, True)}, 1.0, ""),
+        ({"cubic_damping": (0.0, True)}, 0.5, "cubic_damping"),
+        (
+            {"cubic_damping": (0.0, True), "power_law_drag": (0.0, True)},
+            0.5,
+            "cubic_damping power_law_drag",
+        ),
+        ({"cubic_damping": (6.0, True)}, 1 / (1 + math.exp(-3)), "cubic_damping"),
+        # An alternative that one run alone excludes is equivalent.
+        ({"cubic_damping": (30.0, True)}, 1.0, "cubic_damping"),
+    ],
+)
+def test_an_alternative_as_good_takes_a_share(
+    rivals: dict[str, tuple[float, bool]], share: float, equivalent: str
+) -> None:
+    named = {c.name: c for c, *_ in list_candidates((), driven=False)}
+    alternatives = tuple(
+        Alternative(
+            named[name],
+            500.0 - behind,
+            behind,
+            behind / 500.0,
+            refitted=True,
+            contains=name == "power_law_drag",
+            alike=alike,
+        )
+        for name, (behind, alike) in rivals.items()
+    )
+    drag = Identifiability(named["quadratic_drag"], 500.0, 1.0, alternatives)
+    assert drag.share == pytest.approx(share, abs=1e-6)
+    assert drag.equivalent == ["quadratic_drag", *equivalent.split()]
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("seed", [34, 43])
+def test_without_noise_rounding_errors_give_no_effect(seed: int) -> None:
+    clean = {"seed": seed, "noise": 0.0, "counts": 0}
+    nothing, _ = diagnosed(**clean)
+    assert nothing.verdict == "none"
+    assert nothing.gap.after < 1e-9
+    drag, truth = diagnosed("quadratic_drag", **clean)
+    assert drag.verdict == "named"
+    (effect,) = drag.effects
+    assert effect.name == "quadratic_drag"
+    assert effect.parameters["q"] == pytest.approx(truth["quadratic_drag"]["q"], rel=1e-5)
+
+
+# Advice on the next record, detection limits, effects that records do not distinguish.
+
+
+def test_equally_good_names_are_listed_with_what_reveals_them() -> None:
+    result = once("bias_torque", seed=6, size=0.3, free=2, forced=0)
+    assert result.verdict == "ambiguous"
+    text = result.advice.next_experiment
+    assert text is not None
+    assert text.startswith("To distinguish equally good names, record what reveals bias_torque (")
+    (names,) = result.equivalent
+    assert {"bias_torque", "asymmetric_coulomb"} <= set(names)
+    for name in ("bias_torque", "asymmetric_coulomb"):
+        assert f"{name} ({result.definition(name).revealed_by})" in text
+
+
+def test_where_nothing_is_missing_limits_are_lowered() -> None:
+    result = once("none", seed=5, free=1, forced=0)
+    assert result.verdict == "none"
+    limits = result.advice.limits
+    unseen = sum(limit.size == math.inf for limit in limits.values())
+    assert f"{unseen} effects cannot be detected in such" in str(result.advice.next_experiment)
+    # A free decay does not show an added mass; a harmonic of one period a turn is gravity itself.
+    assert limits["added_mass"].size == math.inf
+    assert [c.shape["n"] for c in limits["bearing_harmonic"].unseen] == [1.0]
+    assert limits["encoder_offset"].size == pytest.approx(limits["rig_tilt"].size, rel=1e-3)
+
+
+def test_limits_follow_from_the_thresholds_of_the_diagnosis() -> None:
+    """An effect of one parameter must gain what noise gains with the given probability."""
+    usual = once("none", seed=5, free=1, forced=0).advice.limits
+    records, _ = recorded(seed=5, free=1, forced=0)
+    strict = diagnose(records, thresholds=Thresholds(chance=1e-6)).advice.limits
+    gains = [
+        required_gain(float(chdtri(1, chance / len(usual))), 1)
+        for chance in (Thresholds().chance, 1e-6)
     ]
-    assert min(still) < 0.05
-    assert core.fit.converged
-    assert core.fit.steps < 40
+    ratio = strict["encoder_gain"].size / usual["encoder_gain"].size
+    assert ratio == pytest.approx(math.sqrt(gains[1] / gains[0]))
+    assert ratio > 1.2
+
+
+def test_a_limit_is_passed_in_95_of_100() -> None:
+    """The probability is compared with sums of squares of normal draws about the expected gain."""
+    rng = np.random.default_rng(1)
+    mean = np.array([math.sqrt(required_gain(22.0, 2)), 0.0])
+    gains = np.sum((mean + rng.standard_normal((200_000, 2))) ** 2, axis=1)
+    assert np.mean(gains > 22.0) == pytest.approx(0.95, abs=0.002)
+
+
+@pytest.mark.thorough
+def test_an_effect_of_the_size_of_its_limit_is_found() -> None:
+    """The limit follows from records without an effect; the same rig then has one of that size."""
+    given = {"seed": 11, "free": 2, "forced": 0, "noise": 0.2}
+    limit = once(**given).advice.limits["encoder_gain"].size
+    for size, seen in ((limit, True), (-limit, True), (limit / 4, False)):
+        verdict = once(f"encoder_gain,e={size:.6g}", **given).verdict
+        assert (verdict != "none") is seen
+
+
+@functools.cache
+def baseline(forced: int) -> tuple[DataSplit, FittedModel]:
+    """Return the records of an experiment without hidden effects, and its baseline."""
+    data = split_records(recorded(seed=4, free=2, forced=forced)[0])
+    return data, fit_baseline(data)[0]
+
+
+def scored(names: list[str | Candidate], *, forced: int) -> Scores:
+    pool = [[Candidate(n) if isinstance(n, str) else n] for n in names]
+    return score_candidates(*baseline(forced), pool)
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "forced"),
+    [
+        ("bias_torque", "asymmetric_coulomb", 2),
+        ("drive_frequency", "timebase", 2),
+        ("drive_amplitude", "added_mass", 2),
+        ("rig_tilt", "encoder_offset", 0),
+        # A harmonic of one period a turn is equivalent to gravity and to a rotation of it.
+        ("rig_tilt", Candidate("bearing_harmonic", {"n": 1.0}), 0),
+    ],
+)
+def test_equivalent_effects_have_equal_scores(
+    one: str, other: str | Candidate, forced: int
+) -> None:
+    scores = scored([one, other], forced=forced)
+    assert scores.likeness(0, 1) == pytest.approx(1, abs=1e-4)
+    gains = [score.gain for score in scores.scores]
+    assert gains[0] == pytest.approx(gains[1], rel=1e-2, abs=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        ("rig_tilt", "encoder_offset"),
+        ("drive_frequency", "drive_phase"),
+        ("asymmetric_coulomb", "asymmetric_viscous"),
+    ],
+)
+def test_effects_that_differ_under_a_drive_are_distinguished(one: str, other: str) -> None:
+    assert scored([one, other], forced=2).likeness(0, 1) < 0.99
+
+
+def test_an_effect_that_a_free_decay_does_not_show_gains_nothing() -> None:
+    for score in scored(["added_mass", "sensor_lag"], forced=0).scores:
+        assert score.gain == score.information == 0
