@@ -145,7 +145,7 @@ def checked_effects(
 ) -> tuple[Effect, ...]:
     """Return effects as a tuple; refuse one that repeats a parameter of a model.
 
-    ``own`` has the model's name and value of each parameter of a :class:`Pendulum`.
+    ``parameters`` has the model's name and value of each parameter of a :class:`Pendulum`.
     """
     if not isinstance(effects, list | tuple):
         raise InputError(f"effects must be a tuple of Effect, got {short_repr(effects)}")
