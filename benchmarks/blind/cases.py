@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from benchmarks.blind import mess
 from pendmap import virtual_rig
 from pendmap.model.effects import library
 from pendmap.records import read_experiment
@@ -113,7 +114,7 @@ def draw(what: str, rng: np.random.Generator) -> Case:
 def _effects(what: str, kind: str, rng: np.random.Generator) -> tuple[str, ...]:
     """Draw the hidden effects."""
     free, forced = runs_of(kind)
-    known = {e["name"]: e for e in virtual_rig.describe()}
+    known = {e["name"]: e for e in virtual_rig.describe() if e["name"] not in mess.NAMES}
     usable = [n for n in library() if n in known and n not in BASE]
     if free == 1:
         usable = [n for n in usable if n not in AGEING]
@@ -170,8 +171,10 @@ def record(case: Case, *, clean: bool = False) -> Recorded:
         dropouts=0.0 if clean else case.dropouts,
         outliers=0.0 if clean else case.outliers,
         jitter=0.0 if clean else case.jitter,
-        mess=0.0 if clean else case.mess,
     )
+    sigma = math.hypot(math.radians(case.noise), math.tau / case.counts / math.sqrt(12))
+    if case.mess and not clean:
+        request = mess.added(request, case.mess * sigma)
     with tempfile.TemporaryDirectory() as folder:
         where = virtual_rig.places(Path(folder) / "rig", replace=False)
         virtual_rig.write(virtual_rig.make(request), where)
@@ -184,6 +187,6 @@ def record(case: Case, *, clean: bool = False) -> Recorded:
             for k, run in enumerate(experiment.runs)
         )
         experiment = dataclasses.replace(experiment, runs=runs)
-    sigma = math.hypot(math.radians(case.noise), math.tau / case.counts / math.sqrt(12))
     truth = {e["name"]: e["parameters"] for e in table.get("effect", [])}
+    truth = {name: values for name, values in truth.items() if name not in mess.NAMES}
     return Recorded(experiment, sigma, truth)

@@ -29,7 +29,6 @@ from pendmap.identification.table1 import State, peak_errors
 from pendmap.virtual_rig.effects.base import Drive
 from pendmap.virtual_rig.equation import Equation, Parameters
 from pendmap.virtual_rig.integrator import integrate
-from pendmap.virtual_rig.lanes import Starts
 from pendmap.virtual_rig.sensor import Sensor
 
 if TYPE_CHECKING:
@@ -78,9 +77,8 @@ def recipe_errors() -> dict[str, float]:
 def motion() -> Motion:
     """Return the rig's motion from its release until rest."""
     none = np.zeros(1)
-    starts = Starts(np.zeros(1, int), none, np.array([LASTS]), np.array([RELEASE]), none)
     equation = Equation(TRUE, Drive.harmonic(none, np.ones(1), none), none, [])
-    return integrate(equation, starts)[0]
+    return integrate(equation, np.array([LASTS]), np.array([RELEASE]), none)[0]
 
 
 def record(

@@ -32,7 +32,7 @@ _HIDDEN = group("Hidden effects", "--effect quadratic_drag --seed 3")
 @options_of(
     _REQUEST, "free forced duration seed", group("Runs", "--free 3 --forced 2 --duration 40")
 )
-@options_of(_REQUEST, "effect=effects size mess", _HIDDEN, effects=EFFECT)
+@options_of(_REQUEST, "effect=effects size", _HIDDEN, effects=EFFECT)
 @flag("--list listing", "List the effects and stop.", group=_HIDDEN)
 @options_of(
     _REQUEST, "w0 c_over_m tr=friction theta_r", group("Rig", "--w0 6.2 --c-over-m 0.05 --tr 0.08")

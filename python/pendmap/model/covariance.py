@@ -76,10 +76,7 @@ def covariance_of(notes: Mapping[str, Any]) -> Covariance | None:
 
 def without(notes: Mapping[str, Any], exact: Collection[str]) -> dict[str, Any]:
     """Return notes whose covariance lacks the parameters that are known exactly."""
-    try:
-        known = covariance_of(notes)
-    except InputError:  # drawing models from it raises the error
-        known = None
+    known = covariance_of(notes) if exact else None
     if known is None or not set(known.names) & set(exact):
         return dict(notes)
     table, names = notes["covariance"], notes["covariance"]["names"]

@@ -113,9 +113,8 @@ class EffectDefinition:
     @property
     def opposing(self) -> str | None:
         """Name of the size if the effect is damping whose size is 0 or more."""
-        size = next((parameter for parameter in self.parameters if parameter.role == "size"), None)
-        opposes = size is not None and self.group == "damping" and size.typical[0] >= 0
-        return size.name if size is not None and opposes else None
+        size = next(parameter for parameter in self.parameters if parameter.role == "size")
+        return size.name if self.group == "damping" and size.typical[0] >= 0 else None
 
 
 @functools.cache
@@ -310,6 +309,11 @@ class Effect:
             parameters={n: scale(value, powers[n]) for n, value in self.parameters.items()},
             ci95={n: (scale(a, powers[n]), scale(b, powers[n])) for n, (a, b) in self.ci95.items()},
         )
+
+
+def is_driven(p: float, effects: tuple[Effect, ...]) -> bool:
+    """Return whether the pivot's motion or an effect drives the pendulum."""
+    return p != 0 or any(effect.drives for effect in effects)
 
 
 def _mapping(what: str, value: object, names: list[str]) -> Mapping[str, object]:

@@ -12,15 +12,11 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 from pendmap.errors import InputError, check_keys, check_number, core_errors, named, short_repr
 from pendmap.files import read_toml
 from pendmap.model.effects import Effect, EffectDefinition
+from pendmap.model.quantities import BARE_KEYS, SI_KEYS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-
-_DAMPING: Final = ("c_over_m", "zeta", "gamma", "Tr", "theta_r")
-_DRIVE: Final = ("p", "Omega", "omega", "phi", "phase")
-_TAKEN: Final = frozenset(("w0", "length_m", "gravity", "torque", *_DAMPING, *_DRIVE))
-"""Names of a pendulum's own parameters."""
 
 FORMULA: Final = ("name", "term", "parameters", "revealed_by")
 PARAMETER: Final = ("power", "role", "typical", "range", "unit", "meaning")
@@ -134,7 +130,7 @@ class Formula:
             parts, tables = zip(
                 *(_parameter(n, self.parameters[n], names) for n in names), strict=True
             )
-        if self.name in _TAKEN:
+        if self.name in (*BARE_KEYS, *SI_KEYS):
             raise InputError(
                 f"formula '{self.name}': the name must be another, a pendulum has a parameter of "
                 "that name"

@@ -11,7 +11,7 @@ from pendmap.errors import InputError, check_number, check_type, core_errors, sh
 from pendmap.files import toml_text
 from pendmap.model.covariance import misses
 from pendmap.model.dynamics import Dynamics
-from pendmap.model.effects import Effect
+from pendmap.model.effects import Effect, is_driven
 from pendmap.model.labels import LABELS, unit_of
 from pendmap.model.tables import EFFECT, FORMAT, check_notes, effects_in
 from pendmap.units import NONDIMENSIONAL, Units
@@ -145,7 +145,7 @@ def checked_effects(
 ) -> tuple[Effect, ...]:
     """Return effects as a tuple; refuse one that repeats a parameter of a model.
 
-    ``own`` has the model's name and value of each parameter of a :class:`Pendulum`.
+    ``parameters`` has the model's name and value of each parameter of a :class:`Pendulum`.
     """
     if not isinstance(effects, list | tuple):
         raise InputError(f"effects must be a tuple of Effect, got {short_repr(effects)}")
@@ -228,11 +228,6 @@ def _table(effect: Effect) -> dict[str, Any]:
     entries = {key: getattr(effect, key) for key in EFFECT}
     entries["ci95"] = {name: list(bounds) for name, bounds in effect.ci95.items()} or None
     return {key: value for key, value in entries.items() if value is not None}
-
-
-def is_driven(p: float, effects: tuple[Effect, ...]) -> bool:
-    """Return whether the pivot's motion or an effect drives the pendulum."""
-    return p != 0 or any(effect.drives for effect in effects)
 
 
 def effects_of(attributes: Mapping[Any, Any]) -> tuple[Effect, ...]:

@@ -24,9 +24,9 @@ GROUPS: Final[Mapping[str, tuple[str, ...]]] = {
 OPTIONAL: Final = ("Tr", "torque", "phi", "lab_time_s", "gravity")
 """Quantities with one way to write them."""
 
-_POSITIVE: Final = ("length_m", "gravity", "Omega", "frequency_hz")
+_POSITIVE: Final = ("length_m", "gravity", "frequency_hz")
 _W0: Final = (1e-6, 1e6)
-_NOT_NEGATIVE: Final = ("c_over_m", "zeta", "Tr", "Y", "stroke_mm")
+_NOT_NEGATIVE: Final = ("c_over_m", "zeta", "Tr", "Omega", "Y", "stroke_mm")
 _AGREE: Final = 1e-3  # Largest relative difference of two values of one quantity: rounded digits
 
 
@@ -94,9 +94,9 @@ def resolve(given: Mapping[str, float]) -> dict[str, float]:
     for name, metre in (("Y", 1.0), ("stroke_mm", 1e-3)):
         if name not in checked:
             continue
-        if not ways["Omega"]:
+        omega = one("Omega", ways["Omega"]) if ways["Omega"] else 0.0
+        if omega == 0:
             raise InputError(f"{name} needs a frequency: Omega or frequency_hz must be given")
-        omega = one("Omega", ways["Omega"])
         others = f"{name} = {checked[name]:g}, Omega = {omega:g} and gravity = {gravity:g}"
         ways["p"][f"Y Omega^2/g of {others}"] = amplitude(checked[name] * metre, omega, gravity)
     result = {"w0": w0} | {name: checked[name] for name in OPTIONAL if name in checked}
@@ -126,3 +126,7 @@ COUNTERPARTS: Final[Mapping[str, tuple[str, int]]] = {
     "lab_time": ("lab_time_s", -1),
 }
 """Name in a :class:`Rig` of each parameter of a :class:`Pendulum`, and its power of ``w0``."""
+
+SI_KEYS: Final = (*(name for ways in GROUPS.values() for name in ways), *OPTIONAL)
+BARE_KEYS: Final = (*COUNTERPARTS, "zeta")
+"""Keys of ``[pendulum]`` in a model file, in SI and without dimensions."""

@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any
 from pendmap.errors import InputError, check_keys, check_number, check_type
 from pendmap.model import quantities
 from pendmap.model.dynamics import Dynamics
-from pendmap.model.effects import library
+from pendmap.model.effects import is_driven, library
 from pendmap.model.pendulum import Pendulum, attributes_of, checked_effects, title_of
-from pendmap.model.quantities import COUNTERPARTS
-from pendmap.model.tables import SI_KEYS
+from pendmap.model.quantities import COUNTERPARTS, SI_KEYS
 from pendmap.units import Units
 
 if TYPE_CHECKING:
@@ -98,17 +97,14 @@ class Rig(Dynamics):
 
     def __post_init__(self) -> None:
         for name in self.numbers():
-            value = getattr(self, name)
-            idle = name == "Omega" and value == 0
-            number = check_number(name, value) if idle else quantities.check(name, value)
-            object.__setattr__(self, name, number)
+            object.__setattr__(self, name, quantities.check(name, getattr(self, name)))
         if self.given_stroke is not None:
             stroke = check_number("given_stroke", self.given_stroke)
             if not self.Omega or self.p != quantities.amplitude(stroke, self.Omega, self.gravity):
                 object.__setattr__(self, "given_stroke", None)
         parameters = {bare: (si, getattr(self, si)) for bare, (si, _) in COUNTERPARTS.items()}
         object.__setattr__(self, "effects", checked_effects(self.effects, parameters))
-        if self.Omega == 0 and (self.p != 0 or any(effect.drives for effect in self.effects)):
+        if self.Omega == 0 and is_driven(self.p, self.effects):
             raise InputError("Omega must be a number above 0 where something is driven, got 0")
         try:
             _ = self.pendulum
@@ -199,11 +195,6 @@ class Rig(Dynamics):
     def length_m(self) -> float:
         """The equivalent length ``gravity / w0**2``, m."""
         return self.gravity / self.w0**2
-
-    @property
-    def stroke_m(self) -> float:
-        """The amplitude ``Y = p gravity / Omega**2`` of the pivot's motion, m."""
-        return self.p * self.gravity / self.Omega**2 if self.p else 0.0
 
     @property
     def period(self) -> float:

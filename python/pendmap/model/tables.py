@@ -16,10 +16,9 @@ from pendmap.errors import (
 )
 from pendmap.model import quantities
 from pendmap.model.covariance import without
-from pendmap.model.effects import Effect
+from pendmap.model.effects import Effect, is_driven
 from pendmap.model.formula import each_table, formulas_of
-from pendmap.model.labels import LABELS
-from pendmap.model.quantities import COUNTERPARTS
+from pendmap.model.quantities import BARE_KEYS, COUNTERPARTS, SI_KEYS
 from pendmap.units import Units
 
 FORMAT: Final = 1  # Version of the layout of model files, in their key ``format_version``
@@ -29,8 +28,6 @@ EFFECT: Final = ("name", "parameters", "ci95", "probability", "approximate")
 _EXAMPLES: Final = {"name": '"quadratic_drag"', "parameters": "{ q = 0.01 }"}
 """Keys that an effect needs, with examples for messages."""
 
-SI_KEYS: Final = (*(n for ways in quantities.GROUPS.values() for n in ways), *quantities.OPTIONAL)
-BARE_KEYS: Final = (*COUNTERPARTS, "zeta")
 _ONLY_SI: Final = tuple(name for name in SI_KEYS if name not in BARE_KEYS)
 _ONLY_BARE: Final = tuple(name for name in BARE_KEYS if name not in SI_KEYS)
 
@@ -46,7 +43,9 @@ def model_arguments(
     effects = effects_in(content)
     in_si = _is_si(table)
     numbers = _typed_over(table, typed) if in_si else _bare_numbers(table, typed, effects)
-    exact = [_own_name(name) if in_si else name for name in typed]
+    names = {n: si for si, ways in quantities.GROUPS.items() for n in ways}
+    names |= {bare: si for bare, (si, _) in COUNTERPARTS.items()}
+    exact = [names.get(name, name) if in_si else name for name in typed]
     notes = without({name: content[name] for name in NOTES if name in content}, exact)
     return in_si, {**numbers, "effects": effects, "notes": notes}
 
@@ -88,23 +87,11 @@ def _is_si(table: dict[str, Any]) -> bool:
 
 
 def _instead(key: str) -> str:
-    """Return the end of the message about an unknown key: the keys allowed in its place."""
-    stem = key.rsplit("_", 1)[0]
-    for known in SI_KEYS:
-        if known != "p" and (known.rsplit("_", 1)[0] in (key, stem) or known == stem):
-            unit = LABELS[known].unit or "parts of critical damping"
-            return f": it must be {known}, in {unit}"
-    near = difflib.get_close_matches(key, (*BARE_KEYS, *SI_KEYS), n=1, cutoff=0.7)
+    """Return the end of the message about an unknown key: the nearest key, and all keys."""
+    near = difflib.get_close_matches(key, (*SI_KEYS, *BARE_KEYS), n=1)
     nearest = f", perhaps {near[0]} is meant" if near else ""
     without = ", ".join(BARE_KEYS)
     return f"{nearest}: it must be one of {without}, or in SI {', '.join(SI_KEYS)}"
-
-
-def _own_name(name: str) -> str:
-    """Return the name in a :class:`Rig` of a typed quantity."""
-    if name in COUNTERPARTS:
-        return COUNTERPARTS[name][0]
-    return next((si for si, ways in quantities.GROUPS.items() if name in ways), name)
 
 
 def _typed_over(table: dict[str, Any], typed: Mapping[str, float]) -> dict[str, Any]:
@@ -137,8 +124,7 @@ def _bare_numbers(
         given = numbers.setdefault("gamma", gamma)
         quantities.one("gamma", {"gamma": given, f"2 zeta of zeta = {zeta:g}": gamma})
     numbers |= typed
-    driven = numbers.get("p", 0) != 0 or any(effect.drives for effect in effects)
-    if driven and "omega" not in numbers:
+    if is_driven(numbers.get("p", 0), effects) and "omega" not in numbers:
         raise InputError("p without omega: a drive needs a frequency above 0")
     zeros = {name: float(name == "omega") for name in COUNTERPARTS}
     return zeros | numbers

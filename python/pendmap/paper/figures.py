@@ -160,7 +160,7 @@ def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
     if key == "2":
         return render.draw(tumbling_chart(tumbling(), title), path)
     if key == "3":
-        return render.draw(pendulum.chart(title=title), path)
+        return render.draw(pendulum.chart(title), path)
     if key in ("8", "9"):
         make = motions.steady_states if key == "8" else motions.tumbling
         runs = make(report(seed).methods["combined_repaired"].rig, seed)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.charts.chart import Axis, Chart, Panel
-from pendmap.charts.marks import Areas, Ends, Line, Mark, Text
+from pendmap.charts.marks import Areas, Line, Mark, Text
 from pendmap.formatting import typographic
 
 if TYPE_CHECKING:
@@ -18,13 +18,12 @@ if TYPE_CHECKING:
 
 TITLE: Final = "The parametric pendulum"
 SIZE: Final = (6.0, 5.6)  # Width and height, inches
-HEAD: Final = 0.95  # Height of title, subtitle and margins, inches
+FONT: Final = 10.5  # Size of letters, points
 THETA: Final = math.radians(38.0)  # Angle of the pendulum
 LENGTH: Final = 3.0
 BOB: Final = 0.3
 ASIDE: Final = 0.5
-"""Lengths in units of the drawing, one inch each: rod, radius of the bob, distance of annotations
-from the rod."""
+"""Lengths in units of the drawing: rod, radius of the bob, distance of annotations from the rod."""
 
 _SIDE: Final = np.array([math.cos(THETA), math.sin(THETA)])  # Unit vector across the rod
 _END: Final = LENGTH * np.array([math.sin(THETA), -math.cos(THETA)])  # Centre of the bob
@@ -37,30 +36,25 @@ _DASHED: Final = (6.0, 3.0)
 _RIGHT, _LEFT = ("right", "center"), ("left", "center")
 
 
-def chart(size: Ends | None = None, title: str | None = None) -> Chart:
+def chart(title: str | None = None) -> Chart:
     """Return the drawing: pivot, rod, bob, angle, excitation, gravity, torques of friction.
 
     The pivot's acceleration upward, p g cos(Omega t + phi), adds to gravity; so its position is
     ``-Y cos(Omega t + phi)``, upward, with ``Y = p g / Omega**2``.
     """
-    width, height = size or SIZE
     equation = f"θ'' + (c/m) θ' + ω₀² (1 + p {_DRIVE}) sin θ = -Tr sign(θ');   ω₀² = g/l, p = YΩ²/g"
-    scale = min((width - 0.2) / 5.8, (height - HEAD) / 4.85)
-    wide, high = (width - 0.2) / scale, (height - HEAD) / scale
-    sides = Axis("", (0.55 - wide / 2, 0.55 + wide / 2)), Axis("", (1.25 - high, 1.25))
-    font = 11.0 * min(scale, 1.2)
-    marks = [*_guide(font), *_rod(font), *_forces(font)]
-    panel = Panel("pendulum", "", *sides, marks, bare=True)
-    return Chart(title or TITLE, typographic(equation), [[panel]], size=(width, height))
+    sides = Axis("", (-2.475, 3.575)), Axis("", (-3.6, 1.25))
+    panel = Panel("pendulum", "", *sides, [*_guide(), *_rod(), *_forces()], bare=True)
+    return Chart(title or TITLE, typographic(equation), [[panel]], size=SIZE)
 
 
-def _guide(font: float) -> list[Mark]:
+def _guide() -> list[Mark]:
     """Return the slider on its rail, and the arrow of its motion."""
     slider = np.array([(-0.3, -0.24), (0.3, -0.24), (0.3, 0.24), (-0.3, 0.24), (-0.3, -0.24)])
     rail = np.array([(-0.42, -0.8), (-0.32, -0.8), (-0.32, 0.8), (-0.42, 0.8)])
     rungs = [_line((-0.42, y), (-0.54, y + 0.12), _HELP, 0.7) for y in -0.8 + 0.18 * np.arange(9)]
-    place: dict[str, Any] = {"colour": _HELP, "align": _RIGHT, "size": 0.78 * font}
-    moves: dict[str, Any] = {"colour": _MOTION, "align": _RIGHT, "size": font}
+    place: dict[str, Any] = {"colour": _HELP, "align": _RIGHT, "size": 0.78 * FONT}
+    moves: dict[str, Any] = {"colour": _MOTION, "align": _RIGHT, "size": FONT}
     return [
         Areas([rail], colour=_RAIL, order=1.0),
         *rungs,
@@ -73,7 +67,7 @@ def _guide(font: float) -> list[Mark]:
     ]
 
 
-def _rod(font: float) -> list[Mark]:
+def _rod() -> list[Mark]:
     """Return rod, bob, rest position, angle and length."""
     radius, wide = 1.55, 0.055 * _SIDE
     middle = np.array([math.sin(THETA / 2), -math.cos(THETA / 2)])
@@ -87,32 +81,32 @@ def _rod(font: float) -> list[Mark]:
         Areas([_arc((0.0, 0.0), 0.13)], colour=_WHITE, order=4.0),
         Line(*_arc((0.0, 0.0), 0.13).T, colour=_DARK, width=1.6, order=4.1),
         Areas([_arc((0.0, 0.0), 0.04), _arc(_END, BOB)], colour=_DARK, order=4.2),
-        _text(_END, "m", colour=_WHITE, size=font, order=5.0),
+        _text(_END, "m", colour=_WHITE, size=FONT, order=5.0),
         *_turn(radius, -math.pi / 2, THETA - math.pi / 2, _DARK, 1.3),
-        _text((radius + 0.22) * middle, "θ", colour=_DARK, size=1.3 * font),
+        _text((radius + 0.22) * middle, "θ", colour=_DARK, size=1.3 * FONT),
         *_arrow(move, _END + move, _HELP, both=True, thin=True),
-        _text(_END / 2 + 1.4 * move, "$l$", size=1.1 * font),
+        _text(_END / 2 + 1.4 * move, "$l$", size=1.1 * FONT),
     ]
     for foot, first in ((np.zeros(2), 0.2), (_END, BOB + 0.04)):
         marks.append(_line(foot + first * _SIDE, foot + (ASIDE + 0.08) * _SIDE, _HELP, 0.7))
     return marks
 
 
-def _forces(font: float) -> list[Mark]:
+def _forces() -> list[Mark]:
     """Return gravity, the velocity, and friction and drag against the motion."""
     # The velocity is along the arc, upward.
     start = _END + (ASIDE + 0.14) * _SIDE
     torque = "drag and dry friction over m l²:\n(c/m) dθ/dt + Tr sign(dθ/dt)"
     pull: dict[str, Any] = {"colour": _FORCE, "align": _LEFT}
-    above: dict[str, Any] = {"colour": _MOTION, "align": ("center", "bottom"), "size": font}
+    above: dict[str, Any] = {"colour": _MOTION, "align": ("center", "bottom"), "size": FONT}
     return [
         *_arrow(_END - (0.0, BOB), _END - (0.0, BOB + 0.75), _FORCE),
-        _text(np.add(_END, (0.14, -BOB - 0.5)), "m g", size=font, **pull),
+        _text(np.add(_END, (0.14, -BOB - 0.5)), "m g", size=FONT, **pull),
         *_arrow(start, start + 0.7 * _SIDE, _MOTION),
         _text(start + 0.78 * _SIDE + (0.0, 0.12), "dθ/dt > 0", **above),
         # Torque about the axle, opposite to the rotation.
         *_turn(0.98, math.radians(52), math.radians(-14), _FORCE, 1.6),
-        Text(1.14, 0.42, torque, size=0.82 * font, **pull),
+        Text(1.14, 0.42, torque, size=0.82 * FONT, **pull),
     ]
 
 

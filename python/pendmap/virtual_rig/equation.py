@@ -113,8 +113,8 @@ class Equation:
         parts = [effect.begin(m) for effect in self.effects]
         return np.concatenate(parts, axis=-1) if parts else np.zeros((*m.theta.shape, 0))
 
-    def kicks(self, run: int, begin: float, end: float) -> list[tuple[float, float]]:
+    def kicks(self, run: int, end: float) -> list[tuple[float, float]]:
         """Return times since the run began, s, and velocity jumps at them, rad/s."""
         lab = float(self.lab[run])
-        kicks = [kick for e in self.effects for kick in e.kicks(lab + begin, lab + end)]
+        kicks = [kick for e in self.effects for kick in e.kicks(lab, lab + end)]
         return sorted((time - lab, jump) for time, jump in kicks)

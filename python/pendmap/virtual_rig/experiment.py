@@ -14,9 +14,8 @@ from pendmap.virtual_rig.effects.base import Drive
 from pendmap.virtual_rig.effects.readings import read
 from pendmap.virtual_rig.equation import Equation, Parameters
 from pendmap.virtual_rig.integrator import integrate
-from pendmap.virtual_rig.lanes import Starts
 from pendmap.virtual_rig.presets import PRESETS, RunPlan
-from pendmap.virtual_rig.sensor import Mess, Sensor, check_ranges
+from pendmap.virtual_rig.sensor import Sensor, check_ranges
 
 if TYPE_CHECKING:
     from pendmap.virtual_rig.effects.base import Effect
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
 _AFTER_REST: Final = 3.0  # Time recorded after the pendulum has come to rest, s
 _MOST_SAMPLES: Final = 10_000_000
 """Largest number of samples of all runs; their records take 250 megabytes."""
-_RIG, _RUNS, _EFFECTS, _SENSOR, _MESS = range(5)  # Streams of random numbers
+_RIG, _RUNS, _EFFECTS, _SENSOR = range(4)  # Streams of random numbers
 
 
 @dataclasses.dataclass(frozen=True)
@@ -72,9 +71,6 @@ class Request:
         Share of the samples that are false.
     jitter : float
         Rms deviation of the sampling instants, s.
-    mess : float
-        Size of weak disturbances beside the effects (texture of the bearing, drifting zero, slow
-        noise), in multiples of the noise, at most 100.
     plans : tuple of RunPlan
         The runs, instead of those that the preset draws, their number and their duration.
 
@@ -102,7 +98,6 @@ class Request:
     dropouts: float = 0.0
     outliers: float = 0.0
     jitter: float = 0.0
-    mess: float = 0.0
     plans: tuple[RunPlan, ...] = ()
 
     def __post_init__(self) -> None:
@@ -119,7 +114,6 @@ class Request:
             c_over_m=(0.0, 100.0, "1/s"),
             duration=(1.0, 3600.0, "s"),
             noise=(0.0, 180.0, "degrees"),
-            mess=(0.0, 100.0, ""),
         )
         if self.theta_r is not None and self.friction is not None:
             raise InputError("one of theta_r and Tr must be left out, got both")
@@ -198,7 +192,6 @@ class Experiment:
     effects: list[Effect]
     sensor: Sensor
     runs: list[Run]
-    mess: Mess | None = None
 
 
 def make(request: Request) -> Experiment:
@@ -236,18 +229,11 @@ def make(request: Request) -> Experiment:
     effects = draw(asked, request.stream(_EFFECTS), request.size, kinds)
     readings = [effect for effect in effects if effect.group == "reading"]
     others = [effect for effect in effects if effect.group != "reading"]
-    mess = None
-    if request.mess != 0:
-        spread = request.mess * math.hypot(sensor.noise, sensor.count / math.sqrt(12))
-        longest = max(plan.lab_time + plan.duration for plan in plans)
-        mess = Mess.made(request.stream(_MESS), spread, parameters.w0, longest)
-    bearing: list[Effect] = [] if mess is None else [mess.texture]
     lab, *harmonic = (
         np.array([getattr(plan, name) for plan in plans])
         for name in ("lab_time", "p", "frequency", "phase")
     )
-    drive = Drive.harmonic(*harmonic)
-    equation = Equation(parameters, drive, lab, others + bearing)
+    equation = Equation(parameters, Drive.harmonic(*harmonic), lab, others)
     paths = _integrate(equation, plans, readings)
     if preset.until_rest and request.duration is None and not request.plans:
         plans = [_until_rest(*pair) for pair in zip(plans, paths, strict=True)]
@@ -256,12 +242,9 @@ def make(request: Request) -> Experiment:
         times = sensor.times(plan.duration)
         instants = sensor.instants(times, request.stream(_SENSOR, k, 1))
         reading = read(path, _true(instants, readings), readings)
-        if mess is not None:
-            at = plan.lab_time + instants
-            reading = reading + mess.reading(at, sensor, request.stream(_MESS, k, 1))
         angle, keep = sensor.write_down(reading, request.stream(_SENSOR, k, 0))
         runs.append(Run(plan, path, times[keep], angle[keep], int((~keep).sum())))
-    return Experiment(request, parameters, effects, sensor, runs, mess)
+    return Experiment(request, parameters, effects, sensor, runs)
 
 
 def _sensor(request: Request, rng: np.random.Generator) -> Sensor:
@@ -286,14 +269,8 @@ def _lasting(plans: list[RunPlan], duration: float) -> list[RunPlan]:
 
 def _integrate(equation: Equation, plans: list[RunPlan], readings: list[Effect]) -> list[Path]:
     ends = [max(_true(np.array([plan.duration]), readings)[0], 0.0) for plan in plans]
-    starts = Starts(
-        run=np.arange(len(plans)),
-        begin=np.zeros(len(plans)),
-        end=np.array(ends),
-        theta=np.array([plan.theta for plan in plans]),
-        velocity=np.array([plan.velocity for plan in plans]),
-    )
-    return integrate(equation, starts)
+    theta, velocity = np.array([(plan.theta, plan.velocity) for plan in plans], float).T
+    return integrate(equation, np.array(ends), theta, velocity)
 
 
 def _true(time: Floats, readings: list[Effect]) -> Floats:
@@ -335,9 +312,9 @@ def paper_decay(seed: int = 0) -> tuple[Floats, Floats]:
         s and rad.
     """
     none = np.zeros(1)
-    starts = Starts(np.zeros(1, int), none, np.array([SECONDS]), np.array([RELEASE]), none)
     equation = Equation(PARAMETERS, Drive.harmonic(none, np.ones(1), none), none, [])
+    (path,) = integrate(equation, np.array([SECONDS]), np.array([RELEASE]), none)
     times = SENSOR.times(SECONDS)
-    reading = integrate(equation, starts)[0].angle(times) + OFFSET
+    reading = path.angle(times) + OFFSET
     angle, written = SENSOR.write_down(reading, np.random.default_rng(seed))
     return times[written], angle[written]

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
 from pendmap.virtual_rig import path as gauss
-from pendmap.virtual_rig.lanes import Lanes, Starts, solve
+from pendmap.virtual_rig.lanes import Lanes, solve
 from pendmap.virtual_rig.path import Floats, value
 
 if TYPE_CHECKING:
@@ -36,16 +36,16 @@ PLACES: Final[Floats] = np.arange(17) / 16
 _BASIS: Final = gauss.basis(PLACES, gauss.NODES + 2)
 
 
-def integrate(equation: Equation, starts: Starts) -> list[Path]:
-    """Integrate runs, or parts of them, from start to end; return a path for each start."""
-    lanes = Lanes(equation, starts)
-    live = np.flatnonzero(starts.end > starts.begin)
+def integrate(equation: Equation, end: Floats, theta: Floats, velocity: Floats) -> list[Path]:
+    """Integrate all runs from their initial states to their ends, s; return a path for each."""
+    lanes = Lanes(equation, end, theta, velocity)
+    live = np.flatnonzero(end > 0)
     while live.size:
         step = solve(lanes, live)
         lanes.wish[live] = step.wish
         if step.good.any():
             _commit(lanes, step)
-        live = live[lanes.time[live] < starts.end[live]]
+        live = live[lanes.time[live] < end[live]]
     return lanes.paths
 
 

@@ -29,19 +29,8 @@ _SHORTEST: Final = 1e-9
 _SMALLEST: Final = 1e-300  # Lower bound of a step's error in the step-size formula, rad/s
 
 
-@dataclasses.dataclass(frozen=True)
-class Starts:
-    """Initial states and time spans of N integrations; all arrays have the shape (N,)."""
-
-    run: Indices  # index of the run in the equation
-    begin: Floats  # since the run began, s
-    end: Floats
-    theta: Floats  # at begin, rad
-    velocity: Floats  # at begin, rad/s
-
-
 class Lanes:
-    """State of N lanes, each at its own time, in arrays of shape (N,).
+    """State of N lanes, one for each run, each at its own time, in arrays of shape (N,).
 
     ``time``, ``theta``, ``velocity`` are in s, rad, rad/s; ``own``, shape (N, M), are the effects'
     state variables; ``direction`` and ``side`` the signs of velocity (0: sticking) and load. The
@@ -49,22 +38,18 @@ class Lanes:
     drive, and ends at ``stop`` at the latest: a kick or the end.
     """
 
-    def __init__(self, equation: Equation, starts: Starts) -> None:
-        count = starts.run.size
+    def __init__(self, equation: Equation, end: Floats, theta: Floats, velocity: Floats) -> None:
+        count = end.size
         self.equation = equation
-        self.run = starts.run
-        self.time = starts.begin.astype(float)
-        self.theta = starts.theta.astype(float)
-        self.velocity = starts.velocity.astype(float)
+        self.time, self.theta, self.velocity = np.zeros(count), theta.copy(), velocity.copy()
         self.direction, self.side = np.sign(self.velocity), np.ones(count)
         fastest = max(equation.parameters.w0, float(np.abs(equation.drive.frequency).max()))
         self.longest = 1.0 / fastest
         self.wish = np.full(count, _FIRST * self.longest)
-        self.paths = [Path(lab) for lab in equation.lab[starts.run].tolist()]
+        self.paths = [Path(lab) for lab in equation.lab.tolist()]
         # The last entry is the end of the run: it bounds the steps and is never applied.
         self._kicks = [
-            [*equation.kicks(int(run), float(begin), float(end)), (float(end), 0.0)]
-            for run, begin, end in zip(starts.run, starts.begin, starts.end, strict=True)
+            [*equation.kicks(run, last), (last, 0.0)] for run, last in enumerate(end.tolist())
         ]
         self.stop = np.array([kicks[0][0] for kicks in self._kicks])
         every = np.arange(count)
@@ -77,14 +62,9 @@ class Lanes:
 
     def motion(self, lane: Indices, time: Floats, theta: Floats, velocity: Floats) -> Motion:
         """Return the motion of L lanes at K times each; other arguments have the shape (L, K)."""
-        return self.equation.motion(
-            self.run[lane, np.newaxis],
-            time,
-            theta,
-            velocity,
-            self.direction[lane, np.newaxis],
-            self.side[lane, np.newaxis],
-        )
+        run = lane[:, np.newaxis]
+        signs = self.direction[run], self.side[run]
+        return self.equation.motion(run, time, theta, velocity, *signs)
 
     def margins(self, lane: int, after: Floats, states: Floats) -> tuple[Floats, Floats]:
         """Return the slip margins, rad/s^2, of a lane at rest, at S times ``after`` its own, s.

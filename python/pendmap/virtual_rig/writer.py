@@ -150,7 +150,6 @@ def _truth(experiment: Experiment) -> dict[str, Any]:
             "outliers": sensor.outliers,
             "jitter_s": sensor.jitter,
         },
-        **({} if experiment.mess is None else {"mess": experiment.mess.describe()}),
         "run": [_run(k, run) for k, run in enumerate(experiment.runs)],
     }
 

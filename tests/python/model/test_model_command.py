@@ -22,19 +22,14 @@ if TYPE_CHECKING:
 def test_the_command_takes_and_returns_si(tmp_path: Path, pendmap_command: Run) -> None:
     rig = load_model(written(tmp_path, EXAMPLE))
     end = pendmap.simulate(rig, 1.2, 2.0, 12.5)
-    run = pendmap_command(
-        *("simulate", "--model", "model.toml", "--theta", 1.2, "--velocity", 2),
-        *("--until", 12.5, "--json", "--out", "run.nc"),
-    )
+    words = ("--theta", 1.2, "--velocity", 2, "--until", 12.5, "--json", "--out", "run.nc")
+    run = pendmap_command("simulate", "--model", "model.toml", *words)
     assert run.returncode == 0, run.stderr
     got = json.loads(run.stdout)
-    assert got["units"] == "SI"
-    assert got["t"] == 12.5
+    assert (got["units"], got["t"]) == ("SI", 12.5)
     assert got["theta"] == float(end.theta[-1])
     assert got["velocity"] == float(end.velocity[-1])
-    stored = pendmap.load(tmp_path / "run.nc")
-    assert stored.velocity.attrs["units"] == "rad/s"
-    assert float(stored.time[-1]) == pytest.approx(12.5)
+    assert pendmap.load(tmp_path / "run.nc").velocity.attrs["units"] == "rad/s"
 
 
 @pytest.mark.parametrize(
@@ -68,34 +63,19 @@ def test_typed_parameters_replace_those_of_the_file(
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
-        (
-            ("--model", "model.toml", "--stroke-mm", 2, "--p", 1),
-            "one of --stroke-mm and --p must be left out",
-        ),
-        (
-            ("--model", "model.toml", "--frequency-hz", 2, "--omega", 1),
-            "one of --frequency-hz and --omega must be left out, got both",
-        ),
-        (("--model", "model.toml", "--stroke-mm=-2"), "'--stroke-mm': must be 0 or more, got -2"),
-        (("--model", "model.toml", "--gamma=-2"), "'--gamma': must be 0 or more, got -2"),
-        (
-            ("--model", "model.toml", "--preset", "fig2a"),
-            "one of --model and --preset must be left out",
-        ),
-        (
-            ("--model", "bare.toml", "--stroke-mm", 2),
-            "bare.toml: has no dimensions: stroke_mm must be",
-        ),
-        (("--model", "bare.toml", "--p", 2), "bare.toml: p without omega"),
-        (("--model", "model.nc", "--out", "model.nc"), "'--out': 'model.nc': is an input, which"),
-        (
-            ("--model", "a.zarr/model.toml", "--out", "a.zarr"),
-            "a.zarr: must be a new folder, or a result of pendmap",
-        ),
+        ("model.toml --stroke-mm 2 --p 1", "one of --stroke-mm and --p must be left out"),
+        ("model.toml --frequency-hz 2 --omega 1", "one of --frequency-hz and --omega must be left"),
+        ("model.toml --stroke-mm=-2", "'--stroke-mm': must be 0 or more, got -2"),
+        ("model.toml --gamma=-2", "'--gamma': must be 0 or more, got -2"),
+        ("model.toml --preset fig2a", "one of --model and --preset must be left out"),
+        ("bare.toml --stroke-mm 2", "bare.toml: has no dimensions: stroke_mm must be"),
+        ("bare.toml --p 2", "bare.toml: p without omega"),
+        ("model.nc --out model.nc", "'--out': 'model.nc': is an input, which"),
+        ("a.zarr/model.toml --out a.zarr", "a.zarr: must be a new folder, or a result of pendmap"),
     ],
 )
 def test_the_command_refuses_on_one_line(
-    tmp_path: Path, pendmap_command: Run, words: tuple[Any, ...], complaint: str
+    tmp_path: Path, pendmap_command: Run, words: str, complaint: str
 ) -> None:
     written(tmp_path, EXAMPLE)
     (tmp_path / "bare.toml").write_text("[pendulum]\ngamma = 0.1\n", encoding="utf-8")
@@ -103,9 +83,8 @@ def test_the_command_refuses_on_one_line(
     for copy in ("model.nc", "a.zarr/model.toml"):
         (tmp_path / copy).write_bytes((tmp_path / "model.toml").read_bytes())
     before = sorted(tmp_path.rglob("*"))
-    run = pendmap_command("simulate", *words)
-    assert run.returncode == 2
+    run = pendmap_command("simulate", "--model", *words.split())
+    assert (run.returncode, run.stderr.count("\n")) == (2, 1), run.stderr
     assert complaint in run.stderr
-    assert run.stderr.count("\n") == 1
     assert sorted(tmp_path.rglob("*")) == before
     assert (tmp_path / "model.nc").read_bytes() == (tmp_path / "model.toml").read_bytes()

@@ -94,11 +94,10 @@ def test_unknown_parts_are_refused() -> None:
 
 
 def test_the_pendulum_is_drawn() -> None:
-    for size in (None, (9.0, 5.6), (5.6, 8.0)):
-        with rc_context(style.RC):
-            figure = drawing.draw(pendulum.chart(size), size=size, dpi=100.0)
-            figure.canvas.draw()
-        assert_room(figure)
+    with rc_context(style.RC):
+        figure = drawing.draw(pendulum.chart(), dpi=100.0)
+        figure.canvas.draw()
+    assert_room(figure)
 
 
 def test_a_zero_error_makes_triplets_alternate_until_it_is_removed() -> None:

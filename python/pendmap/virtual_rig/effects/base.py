@@ -179,7 +179,7 @@ class Effect:
         return np.zeros((*motion.theta.shape, self.states))
 
     def reaction(self, motion: Motion, states: Floats) -> Floats:
-        """Return the acceleration, rad/s^2, with the effect's state variables ``own``."""
+        """Return the acceleration, rad/s^2, with the effect's state variables."""
         return np.asarray(self.acceleration(motion))
 
     def rates(self, motion: Motion, states: Floats, acceleration: Floats) -> Floats:
@@ -212,7 +212,7 @@ def effect(
 ) -> Callable[[Callable[..., Any]], type[Effect]]:
     """Return an Effect class, named after the function that implements its one ``method``.
 
-    The function takes the method's arguments, then the effect's parameters. ``said`` holds these,
+    The function takes the method's arguments, then the effect's parameters. ``fields`` holds these,
     made by :func:`size` and :func:`shape`, and class variables; a variant has those ``of`` another.
     """
     parameters = [name for name, value in fields.items() if isinstance(value, dataclasses.Field)]
