@@ -35,7 +35,7 @@ import click
 import netCDF4
 
 import pendmap
-from damages import DAMAGES, sound
+from damages import DAMAGES, DESCRIPTIONS, sound
 from pendmap import cli
 from pendmap.cli.main import command
 
@@ -125,26 +125,6 @@ name = "root_drag"
 term = "-k*sqrt(abs(v))*sign(v)"
 parameters = { k = { power = 1.5, typical = [1e-4, 0.3] } }
 """
-EXPERIMENT: Final = """[rig]
-gravity = 9.81
-encoder_counts = 4096
-[columns]
-time = { name = "t_s", unit = "s" }
-angle = { name = "theta_rad", unit = "rad", scale = 1.0, zero = 0.0 }
-[reader]
-delimiter = ","
-decimal = "."
-skip_rows = 0
-[[run]]
-file = "run.csv"
-from_s = 0.0
-to_s = 9.0
-hold_out = true
-[[run]]
-file = "run.csv"
-kind = "forced"
-drive = { p = 0.2, Omega = 12.1, phi = 0.1 }
-"""
 
 
 def given_files() -> dict[str, bytes]:
@@ -224,7 +204,8 @@ def model(rng: random.Random) -> Case:
 
 def experiment(rng: random.Random) -> Case:
     """Draw the description of an experiment."""
-    files = {"lab/experiment.toml": spoiled(rng, EXPERIMENT), "lab/run.csv": sound().encode()}
+    text, _ = rng.choice(list(DESCRIPTIONS.values()))
+    files = {"lab/experiment.toml": spoiled(rng, text), "lab/run.csv": sound().encode()}
     return Case(["look", "lab", "--json"], files)
 
 

@@ -14,7 +14,6 @@ import click
 import pytest
 
 import pendmap
-from pendmap import _core
 from pendmap.cli.main import command
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -97,14 +96,6 @@ def test_only_fronts_list_their_exports() -> None:
 def test_a_command_is_an_analysis_or_a_module_of_its_name(name: str) -> None:
     analysis = name in {command for command, *_ in pendmap.ANALYSES.values()}
     assert analysis != (PACKAGE / "cli" / f"{name}.py").exists()
-
-
-def test_every_parameter_of_an_effect_has_a_role_and_a_unit() -> None:
-    for effect in _core.effects():
-        assert effect["family"], effect["name"]
-        for parameter in effect["parameters"]:
-            assert parameter["role"], parameter
-            assert parameter["unit"], parameter
 
 
 def test_numbers_become_text_in_one_place() -> None:

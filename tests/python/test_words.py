@@ -53,9 +53,7 @@ def test_text_is_broken_between_words_and_keeps_them(text: str) -> None:
     longest = max(map(len, text.split()), default=0) + 4
     assert all(len(line) <= max(30, longest + 8) for line in lines.split("\n"))
     assert wrapped(lines, 200) == lines
-
-
-def test_a_number_and_its_unit_stay_together() -> None:
+    # A number and its unit stay together.
     lines = wrapped("Of the starts 45.4 % +- 0.1 % end here, and p = 1.7 stands", 20)
     assert lines == "Of the starts 45.4 %\n  +- 0.1 % end here,\n  and p = 1.7 stands"
 

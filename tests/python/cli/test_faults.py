@@ -110,10 +110,8 @@ def test_a_recording_by_default_is_left_out_and_named(tmp_path: Path) -> None:
     (tmp_path / "here").mkdir()
     run = run_command(tmp_path / "here", *SMALL, env=without("rerun pyarrow", tmp_path))
     assert (run.returncode, run.stderr) == (0, "")
-    assert sorted(path.name for path in (tmp_path / "here").iterdir()) == [
-        "basins.nc",
-        "basins.png",
-    ]
+    names = {path.name for path in (tmp_path / "here").iterdir()}
+    assert names == {"basins.nc", "basins.png"}
     assert run.stdout.endswith("Left out: basins.rrd, which needs the extra pendmap[viewer]\n")
 
 
@@ -244,21 +242,17 @@ def test_a_zarr_replaces_nothing_but_a_result(tmp_path: Path, result: xr.Dataset
     target.unlink()
     target.mkdir()
     pendmap.save(result, target)  # an empty folder holds nothing
-    for name in ("notes.txt", "label/notes.txt", "photos/.hidden"):
+    for name in ("label/notes.txt", "photos/.hidden"):
         (target / name).parent.mkdir(exist_ok=True)
         (target / name).write_text("mine")
         with pytest.raises(InputError, match="no part of a result"):
             pendmap.save(result, target)
         assert (target / name).read_text() == "mine"
         (target / name).unlink()
-    (tmp_path / "a.zarr").mkdir()
-    (tmp_path / "a.zarr" / "thesis.tex").write_text("mine")
     others = xr.Dataset({"x": ("t", [1.0])}, attrs={"format_version": 3, "kind": "raw"})
     others.to_zarr(tmp_path / "b.zarr", zarr_format=2)
-    for foreign in ("a.zarr", "b.zarr"):
-        with pytest.raises(InputError, match="does not contain a result"):
-            pendmap.save(result, tmp_path / foreign)
-    assert (tmp_path / "a.zarr" / "thesis.tex").read_text() == "mine"
+    with pytest.raises(InputError, match="does not contain a result"):
+        pendmap.save(result, tmp_path / "b.zarr")
 
 
 def test_drawn_cases_end_well() -> None:
