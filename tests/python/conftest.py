@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-import atexit
+import contextlib
 import functools
+import io
 import json
 import os
 import subprocess
 import sys
+import warnings
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
+from unittest import mock
 
 import pytest
 from hypothesis import HealthCheck, settings
 
 import hidden
-from command_children import Commands
 from pendmap import cli
 
 if TYPE_CHECKING:
@@ -23,9 +26,6 @@ if TYPE_CHECKING:
 
 HERE = Path(__file__).resolve().parent
 COMMAND = Path(sys.executable).with_name("pendmap")
-CURRENT = "PYTEST_CURRENT_TEST"
-AT_START = {k: v for k, v in os.environ.items() if k not in {"DISPLAY", "WAYLAND_DISPLAY", CURRENT}}
-"""The environment of this process before any test has changed it."""
 
 # The load of the machine fails no test; files of one example are overwritten by the next.
 settings.register_profile(
@@ -34,14 +34,6 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
 )
 settings.load_profile("steady")
-
-
-@functools.cache
-def _commands() -> Commands:
-    """Return the process that runs commands, one of each process of this test run."""
-    commands = Commands()
-    atexit.register(commands.close)
-    return commands
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -61,42 +53,55 @@ def truths() -> dict[str, Any]:
     return content
 
 
-class Run(Protocol):
-    """The command line, run in a folder of its own."""
-
-    def __call__(
-        self, *words: object, env: dict[str, str] | None = None
-    ) -> subprocess.CompletedProcess[str]:
-        """Run the command to its end."""
-        ...
+Run = Callable[..., "subprocess.CompletedProcess[str]"]
+"""The command line, run in a folder of its own: a function of words, and `env`."""
 
 
 def run_command(
     folder: Path, *words: object, env: dict[str, str] | None = None
 ) -> subprocess.CompletedProcess[str]:
-    """Run `pendmap` with the given words in a folder, without a display.
-
-    A command with an environment of its own is a process of its own; others are children of one.
-    """
+    """Run `pendmap` in a folder, without a display; with `env` in a process of its own."""
+    typed = [str(word) for word in words]
     clean = {k: v for k, v in os.environ.items() if k not in {"DISPLAY", "WAYLAND_DISPLAY"}}
-    own = env is not None or {k: v for k, v in clean.items() if k != CURRENT} != AT_START
-    if not own and hasattr(os, "fork"):
-        return _commands().run([*map(str, words)], folder, clean)
-    return subprocess.run(
-        [str(COMMAND), *map(str, words)],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=600,  # s: limit for a command that hangs; a loaded machine may take minutes
-        cwd=folder,
-        env=clean | (env or {}),
-    )
+    if env is not None:
+        return subprocess.run(
+            [str(COMMAND), *typed],
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=600,  # s: limit for a command that hangs; a loaded machine may take minutes
+            cwd=folder,
+            env=clean | env,
+        )
+    out, err = (io.TextIOWrapper(io.BytesIO(), encoding="utf-8") for _ in range(2))
+    with (
+        contextlib.chdir(folder),
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(err),
+        mock.patch.dict(os.environ, clean, clear=True),
+        mock.patch.object(sys, "argv", ["pendmap", *typed]),
+        warnings.catch_warnings(),
+        pytest.raises(SystemExit) as end,
+    ):
+        cli.run()
+    texts = []
+    for stream in (out, err):
+        stream.seek(0)
+        texts.append(stream.read())
+    return subprocess.CompletedProcess(typed, int(end.value.code or 0), *texts)
 
 
 @pytest.fixture
 def pendmap_command(tmp_path: Path) -> Run:
-    """Return a function that runs `pendmap` in `tmp_path`, without a display."""
+    """Return a function that runs `pendmap` in `tmp_path`."""
     return functools.partial(run_command, tmp_path)
+
+
+@pytest.fixture
+def rig(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
+    """Return a function that runs `pendmap rig` in `tmp_path`, the current folder."""
+    monkeypatch.chdir(tmp_path)
+    return functools.partial(run_command, tmp_path, "rig")
 
 
 @pytest.fixture
@@ -107,19 +112,3 @@ def strict_recordings() -> Iterator[None]:
     rr.set_strict_mode(True)
     yield
     rr.set_strict_mode(False)
-
-
-@pytest.fixture
-def rig(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Run:
-    """Return a function that runs `pendmap rig` in `tmp_path`, within this process for speed."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*words: object, env: dict[str, str] | None = None) -> subprocess.CompletedProcess[str]:
-        assert env is None
-        monkeypatch.setattr(sys, "argv", ["pendmap", "rig", *map(str, words)])
-        with pytest.raises(SystemExit) as end:
-            cli.run()
-        out, err = capsys.readouterr()
-        return subprocess.CompletedProcess(words, int(end.value.code or 0), out, err)
-
-    return run

@@ -21,12 +21,9 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-__all__ = ["DAMAGES", "DESCRIPTIONS", "Damage", "one_line", "sound"]
-
 
 @functools.cache
 def sound() -> str:
-    """Return a clean record of 10 s."""
     return text(clean(duration=10.0))
 
 
@@ -51,8 +48,6 @@ class Damage:
 
 
 def arrays(change: Callable[[Floats, Floats], tuple[Floats, Floats]]) -> Callable[[str], str]:
-    """Change the numbers of a record."""
-
     def make(sound: str) -> str:
         time, theta = np.loadtxt(io.StringIO(sound), delimiter=",", skiprows=1).T
         return text(change(time.copy(), theta.copy()), form="%.10g")
@@ -61,18 +56,15 @@ def arrays(change: Callable[[Floats, Floats], tuple[Floats, Floats]]) -> Callabl
 
 
 def lines(change: Callable[[list[str]], list[str]]) -> Callable[[str], str]:
-    """Change the lines of a record; the first is its header."""
     return lambda sound: "\n".join(change(sound.splitlines())) + "\n"
 
 
 def at(values: Floats, places: object, new: object) -> Floats:
-    """Set values at the given places."""
     values[places] = new  # type: ignore[index]
     return values
 
 
 def every(row: str, k: int) -> Callable[[str], str]:
-    """Insert a row after every k rows."""
     return lines(
         lambda rows: [
             part
@@ -83,8 +75,6 @@ def every(row: str, k: int) -> Callable[[str], str]:
 
 
 def parquet(change: Callable[[pd.DataFrame], pd.DataFrame]) -> Callable[[str], bytes]:
-    """Write a record as Parquet."""
-
     def make(sound: str) -> bytes:
         buffer = io.BytesIO()
         change(pd.read_csv(io.StringIO(sound))).to_parquet(buffer)
@@ -125,22 +115,16 @@ MISSING = ("-", "NaN", "nan", "", "null", "N/A", "inf", "-inf", "#N/A")
 
 TEXTS = {
     "empty": bad(lambda _: "", "is empty"),
-    "blanks": bad(lambda _: " \n\n \t\n", "is empty"),
     "nul bytes alone": bad(lambda _: b"\0" * 500, "is empty"),
     "only a header": bad(lambda s: s.splitlines()[0] + "\n", "no rows of numbers"),
     "one row": bad(lambda s: "\n".join(s.splitlines()[:2]), "must have 5 samples or more with time and angle, got 1 sample"),
-    "two rows": bad(lambda s: "\n".join(s.splitlines()[:3]), "2 samples"),
-    "four rows": bad(lambda s: "\n".join(s.splitlines()[:5]), "4 samples"),
     "one column": bad(lambda s: "\n".join(r.split(",")[0] for r in s.splitlines()), "no column of angles"),
     "random bytes": bad(lambda _: RNG.bytes(5000), ""),
-    "a picture": bad(lambda _: b"\x89PNG\r\n\x1a\n" + RNG.bytes(3000), ""),
     "a workbook": bad(lambda _: b"PK\x03\x04" + RNG.bytes(3000), "Excel"),
     "an old workbook": bad(lambda _: b"\xd0\xcf\x11\xe0" + RNG.bytes(3000), "Excel"),
     "compressed": bad(lambda s: gzip.compress(s.encode()), "compressed"),
     "hdf5": bad(lambda _: b"\x89HDF\r\n\x1a\n" + RNG.bytes(300), "HDF5"),
     "matlab": bad(lambda _: b"MATLAB 5.0 MAT-file" + bytes(300), "MATLAB"),
-    "prose": bad(lambda _: "It was a dark and stormy night;\nthe rain fell.\n" * 40, "no rows"),
-    "html": bad(lambda _: "<html><body>\n<p>404, not found</p>\n</body></html>\n", "no rows"),
     "json": bad(lambda _: '{"t_s": [0, 1, 2],\n "theta_rad": [1, 2, 3]}\n', "no rows"),
     "other names": bad(lambda s: s.replace("t_s,theta_rad", "foo,bar"), "no column of times"),
     "no angle": bad(lambda s: s.replace("theta_rad", "humidity"), "no column of angles"),
@@ -151,33 +135,25 @@ TEXTS = {
         lambda s: s.splitlines()[0] + "\n" + s.split("\n", 1)[1].replace(".", ","), "delimiter"
     ),
     "half a line": said(lambda s: s[:-9], "half-line"),
-    "half a line without the angle": said(lambda s: s + "10.01", "unreadable-lines"),
     "nul bytes at the end": said(lambda s: s.encode() + b"\0" * 60, "nul-bytes"),
     "nul bytes inside": said(lambda s: s.encode().replace(b"\n", b"\0\n", 50), "nul-bytes"),
     "noise lines at the start": said(lambda s: "boot v1.2\n~~\xff?\nok\n" + s),
     "a message between rows": said(every("WARNING: buffer 80 % full", 100), "unreadable-lines"),
-    "headers again": said(every("t_s,theta_rad", 200), "unreadable-lines"),
     "a column too many in places": said(every("1.0,2.0,3.0", 300), "unreadable-lines"),
     "a trailing comma": said(lambda s: s.replace("\n", ",\n")),
     "windows lines": said(lambda s: s.replace("\n", "\r\n")),
     "old mac lines": said(lambda s: s.replace("\n", "\r")),
-    "mixed lines": said(lambda s: s.replace("\n", "\r\n", 300)),
     "a mark before the text": said(lambda s: b"\xef\xbb\xbf" + s.encode()),
     "utf-16": said(lambda s: s.encode("utf-16")),
     "utf-16 without a mark": said(lambda s: s.encode("utf-16-le")),
     "latin-1": said(lambda s: s.replace("theta_rad", "Winkel [°]").encode("latin-1")),
     "empty lines": said(lambda s: s.replace("\n", "\n\n")),
     "blanks around": said(lambda s: s.replace(",", "  ,  ").replace("\n", "  \n")),
-    "quotes": said(lambda s: '"' + s.strip().replace(",", '","').replace("\n", '"\n"') + '"\n'),
-    "semicolons": said(lambda s: s.replace(",", ";")),
     "tabs": said(lambda s: s.replace(",", "\t")),
     "blanks between": said(lambda s: s.replace(",", "   ")),
     "decimal commas": said(lambda s: s.replace(",", ";").replace(".", ",")),
     "quoted decimal commas": said(
-        lambda s: "\n".join(
-            ",".join(f'"{part}"'.replace(".", ",") for part in row.split(","))
-            for row in s.splitlines()
-        )
+        lambda s: '"' + s.strip().replace(",", '","').replace("\n", '"\n"').replace(".", ",") + '"\n'
     ),
     "no header": said(lambda s: s.split("\n", 1)[1], "columns-guessed"),
     "comments": said(lambda s: "# pendulum 3\n# 2024-05-01\n" + s),
@@ -189,7 +165,6 @@ TEXTS = {
         )
         for word in MISSING
     },
-    "parquet": said(parquet(lambda f: f), suffix=".parquet"),
     "parquet with dates": said(
         parquet(lambda f: f.assign(t_s=pd.Timestamp(2024, 5, 1) + pd.to_timedelta(f.t_s, "s"))),
         suffix=".parquet",
@@ -197,6 +172,8 @@ TEXTS = {
     "parquet with words": bad(
         parquet(lambda f: f.assign(theta_rad="x")), "no row has a number", ".parquet"
     ),
+    "parquet with lists": bad(parquet(lambda f: f.assign(theta_rad=[[x] for x in f.theta_rad])), "", ".parquet"),
+    "parquet with switches": said(parquet(lambda f: f.assign(theta_rad=f.theta_rad > 0)), "no-motion", suffix=".parquet"),
     "parquet without rows": bad(parquet(lambda f: f.iloc[:0]), "is empty", ".parquet"),
     "parquet cut": bad(lambda s: parquet(lambda f: f)(s)[:900], "Parquet", ".parquet"),
     "csv called parquet": bad(lambda s: s, "Parquet", ".parquet"),
@@ -212,19 +189,14 @@ TIMES = {
     "rows in another order": said(arrays(lambda t, a: tuple(RNG.permutation(np.c_[t, a]).T)), "time-backwards"),
     "one false stamp": said(arrays(lambda t, a: (at(t, 400, 1e9), a)), "time-backwards"),
     "one stamp of zero": said(arrays(lambda t, a: (at(t, 400, 0.0), a)), "time-backwards"),
-    "a repeated row": said(every("0.500000,0.1", 2000)),
     "stamps twice": said(arrays(lambda t, a: (np.repeat(t, 2), np.repeat(a, 2))), "time-duplicate"),
     "a coarse clock": said(arrays(lambda t, a: (np.floor(t / 0.03) * 0.03, a)), "time-coarse"),
     "jitter": said(arrays(lambda t, a: (t + RNG.normal(0, 1e-3, t.size), a)), "time-jitter"),
     "a gap": said(arrays(lambda t, a: (np.delete(t, slice(300, 350)), np.delete(a, slice(300, 350)))), "time-gap"),
-    "many gaps": said(arrays(lambda t, a: _lossy(t, a, 0.05)), "time-gap"),
     "uneven": said(arrays(lambda t, a: _lossy(t, a, 0.4)), "time-uneven"),
     "milliseconds": said(arrays(lambda t, a: (t * 1e3, a)), "time-unit"),
-    "microseconds": said(arrays(lambda t, a: (t * 1e6, a)), "time-unit"),
     "a clock that starts again": said(arrays(lambda t, a: (np.where(t < 4, t, t - 4), a)), "time-restarts"),
     "a counter of 16 bits": said(arrays(lambda t, a: ((t + 60) % 65.536, a)), "time-restarts"),
-    "since 1970": said(arrays(lambda t, a: (np.round(t, 2) + 1_700_000, a))),
-    "negative times": said(arrays(lambda t, a: (t - 100, a))),
     "sampled slowly": said(arrays(lambda t, a: (t[::15], a[::15])), "sampling-slow"),
     "time twice": bad(lambda s: "t_s,theta_rad\n" + "\n".join(r.split(",")[0] + "," + r.split(",")[0] + "e9" for r in s.splitlines()[1:]), ""),
 }  # fmt: skip
@@ -235,19 +207,15 @@ ANGLES = {
     "noise alone": said(arrays(lambda t, a: (t, RNG.normal(0, 1e-3, t.size))), "no-motion"),
     "huge": bad(arrays(lambda t, a: (t, a * 1e200)), "samples"),
     "one huge": said(arrays(lambda t, a: (t, at(a, 500, 1e300))), "angle-missing"),
-    "one large": said(arrays(lambda t, a: (t, at(a, 500, 1e9))), "angle-missing"),
     "one outlier": said(arrays(lambda t, a: (t, at(a, 500, 3.0))), "outliers"),
     "two outliers together": said(arrays(lambda t, a: (t, at(a, [500, 501], [3.0, -2.0]))), "outliers"),
-    "many outliers": said(arrays(lambda t, a: (t, at(a, slice(20, None, 60), 2.5))), "outliers"),
     "zeros for lost samples": said(arrays(lambda t, a: (t, at(a, [62, 131, 340, 541], 0.0))), "outliers"),
     "missed counts": said(arrays(lambda t, a: (t, a + 40 * COUNT * (t > 4))), "missed-counts"),
-    "missed counts twice": said(arrays(lambda t, a: (t, a + 60 * COUNT * (t > 4) - 50 * COUNT * (t > 7))), "missed-counts"),
     "a zero that jumps": said(arrays(lambda t, a: (t, a + 0.1234 * (t > 4))), "missed-counts"),
     "degrees": said(arrays(lambda t, a: (t, np.degrees(a))), "angle-unit"),
     "turned by 90 degrees": said(arrays(lambda t, a: (t, a + math.pi / 2)), "gauge-turned"),
     "turned by 180 degrees": said(arrays(lambda t, a: (t, a + math.pi)), "gauge-turned"),
     "zero far off": said(arrays(lambda t, a: (t, a + 0.5)), "zero-offset"),
-    "zero a little off": said(arrays(lambda t, a: (t, a + 0.02)), "zero-offset"),
     "wrapped": said(arrays(lambda t, a: (t, np.mod(a, 2 * math.pi))), "angle-wrapped"),
     "clipped": said(arrays(lambda t, a: (t, np.clip(a, -0.7, 0.7))), "clipped"),
     "frozen": said(arrays(lambda t, a: (t, at(a, slice(425, 440), a[425]))), "frozen"),
@@ -271,21 +239,15 @@ DESCRIPTIONS = {
     "unknown table": (RUN + "[rigs]\nw0 = 6\n", "perhaps rig is meant"),
     "unknown rig key": (RUN + "[rig]\nlength = 0.2\n", "perhaps length_m is meant"),
     "unknown run key": (RUN + "lab_time = 3\n", "perhaps lab_time_s is meant"),
-    "unknown channel": (RUN + '[columns]\nangles = "a"\n', "perhaps angle is meant"),
-    "unknown column key": (RUN + '[columns]\nangle = { nam = "a" }\n', "perhaps name is meant"),
     "drive in millimetres": (RUN + "drive = { stroke_mm = 20, Omega = 3 }\n", r"p = Y Omega\^2/g"),
     "drive in hertz": (RUN + "drive = { p = 0.1, frequency_hz = 3 }\n", "Omega = 2 pi f"),
     "edge that is none": (RUN + '[columns]\ntrigger = { edge = "up" }\n', '"rising" or "falling"'),
     "edge of an angle": (RUN + '[columns]\nangle = { edge = "rising" }\n', "edge is not known"),
-    "unknown drive key": (RUN + "drive = { p = 0.2, omega = 3 }\n", "perhaps Omega is meant"),
-    "unknown reader key": (RUN + "[reader]\nskip = 2\n", "perhaps skip_rows is meant"),
     "kind": (RUN + "kind = 'driven'\n", "must be"),
     "free and driven": (RUN + "kind = 'free'\ndrive = { p = 1, Omega = 3 }\n", "kind must be"),
     "drive without Omega": (RUN + "drive = { p = 0.2 }\n", "Omega must be given"),
     "drive backwards": (RUN + "drive = { p = 0.2, Omega = -3 }\n", "Omega must be 1e-12"),
-    "drive and pivot": (
-        RUN + "drive = { p = 1, Omega = 3 }\npivot = { vertical = 'a' }\n", "one of drive and pivot must",
-    ),
+    "drive and pivot": (RUN + "drive = { p = 1, Omega = 3 }\npivot = { vertical = 'a' }\n", "one of drive and pivot must"),
     "pivot of no column": (RUN + "pivot = { unit = 'm' }\n", "must name a column"),
     "pivot's unit": (RUN + "pivot = { vertical = 'a', unit = 'inch' }\n", "unit must be .*, got 'inch'"),
     "pivot's column": (RUN + "pivot = { vertical = 'theta_rd' }\n", "perhaps 'theta_rad' is meant"),

@@ -29,7 +29,6 @@ def run(*words: str) -> str:
 with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
     assert run("--version").split() == ["pendmap", pendmap.__version__]
     facts = json.loads(run("info", "--json"))
-    print({key: facts[key] for key in ("version", "simd", "simd_available", "python")})
     assert Path(pendmap.__file__).is_relative_to(sysconfig.get_path("platlib"))
     run("basins", "--p", "0.6", "--grid", "200")
     for simd in facts["simd_available"]:

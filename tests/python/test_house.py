@@ -14,7 +14,6 @@ import click
 import pytest
 
 import pendmap
-from pendmap import _core
 from pendmap.cli.main import command
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -54,30 +53,17 @@ def imported(path: Path) -> set[str]:
 
 
 def test_six_files_stand_at_the_root() -> None:
-    names = {path.name for path in PACKAGE.glob("*.py")}
-    assert names <= {
-        "__init__.py",
-        "__main__.py",
-        "errors.py",
-        "files.py",
-        "formatting.py",
-        "units.py",
-    }
+    names = {path.stem for path in PACKAGE.glob("*.py")}
+    assert names <= {"__init__", "__main__", "errors", "files", "formatting", "units"}
 
 
-def test_no_package_has_more_than_30_files() -> None:
+def test_packages_and_files_are_small() -> None:
     folders = {path.parent for path in MODULES}
     assert not [folder.name for folder in folders if len(list(folder.glob("*.py"))) > 30]
-
-
-def test_no_file_has_more_than_450_lines() -> None:
     sizes = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in MODULES}
     assert not {str(path.relative_to(PACKAGE)): n for path, n in sizes.items() if n > 450}
     assert sum(sizes.values()) <= LINES
-
-
-def test_no_line_escapes_the_formatter() -> None:
-    mark = "fmt: " + "skip"
+    mark = "fmt: " + "skip"  # a line that escapes the formatter
     assert not [str(path) for path in MODULES if mark in path.read_text(encoding="utf-8")]
 
 
@@ -110,36 +96,6 @@ def test_only_fronts_list_their_exports() -> None:
 def test_a_command_is_an_analysis_or_a_module_of_its_name(name: str) -> None:
     analysis = name in {command for command, *_ in pendmap.ANALYSES.values()}
     assert analysis != (PACKAGE / "cli" / f"{name}.py").exists()
-
-
-def test_every_parameter_of_an_effect_has_a_role_and_a_unit() -> None:
-    for effect in _core.effects():
-        assert effect["family"], effect["name"]
-        for parameter in effect["parameters"]:
-            assert parameter["role"], parameter
-            assert parameter["unit"], parameter
-
-
-def test_effects_are_named_only_in_the_library() -> None:
-    """Code that names an effect decides something that the library should define."""
-    names = {effect["name"] for effect in _core.effects()}
-    found = {
-        (path.relative_to(PACKAGE).as_posix(), node.value)
-        for path in MODULES
-        if "virtual_rig" not in path.parts
-        for node in ast.walk(tree(path))
-        if isinstance(node, ast.Constant) and node.value in names
-    }
-    assert {name for _, name in found} <= {
-        "bias_torque",  # the torque of the pendulum itself
-        "coulomb_friction",  # the friction of the pendulum itself
-        "drive_phase",
-        "encoder_gain",
-        "encoder_offset",  # the zero of the sensor, fitted by every method
-        "quadratic_drag",  # tried by identify by default
-        "stribeck_friction",
-        "viscous_damping",
-    }
 
 
 def test_numbers_become_text_in_one_place() -> None:

@@ -126,7 +126,9 @@ def melnikov(pendulum: Pendulum | Rig, omega: ArrayLike | None = None) -> xr.Dat
             "effects: an effect counts turns: no orbit leads from one upright position to the next"
         )
     frequencies = grid.frequencies(np.linspace(*_RANGE) if omega is None else omega)
+    none = np.zeros(0)
     with core_errors():
+        _core.advance(bare, none, none, 0, 1, 1)  # refuses effects that no map has
         orbits, sense = _orbits(bare)
         at = {name: _threshold(bare, bare.omega, orbit) for name, orbit in orbits.items()}
         if not sense:

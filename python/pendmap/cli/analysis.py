@@ -15,6 +15,7 @@ from pendmap.cli.parse import types
 from pendmap.cli.parse.model_options import model_options, varied_model_options
 from pendmap.cli.parse.options import (
     OUTPUT,
+    START,
     added,
     group,
     new_command,
@@ -52,7 +53,6 @@ class Entry(NamedTuple):
     stored: bool = False  # computed in tiles, which a store keeps
 
 
-_SWEPT: Final = group("Start", "--theta 2.5 --velocity 0")
 _STRETCH: Final = group("Trajectory", "--until 500")
 _VIEWER: Final = "127.0.0.1:9876"
 _ENTRIES: Final = {
@@ -131,8 +131,8 @@ _ENTRIES: Final = {
             "pendmap bifurcation --p 0.9:2:500 --theta-r 0.02 --out bifurcation.pdf",
         ),
         further=(
-            option("--theta", types.NUMBER, "Angle where both sweeps start, rad.", group=_SWEPT),
-            option("--velocity", types.NUMBER, "Velocity there, in SI rad/s.", group=_SWEPT),
+            option("--theta", types.NUMBER, "Angle where both sweeps start, rad.", group=START),
+            option("--velocity", types.NUMBER, "Velocity there, in SI rad/s.", group=START),
         ),
         model=varied_model_options,
         stored=True,

@@ -82,14 +82,11 @@ def command(
     usual = ("model", "plot", "report", "rerun")
     outputs = Outputs.take(given, "diagnose", reads, default=usual, always=("model",))
     baseline = None if model is None else rig_from(model)
-    with outputs.progress("read"):
-        experiment = read_experiment(path, rate_hz=rate_hz)
+    experiment = read_experiment(path, rate_hz=rate_hz)
     with outputs.progress("diagnose") as progress:
         result = diagnose(experiment, model=baseline, effects=effects, progress=progress, **given)
-    with outputs.progress("write"):
-        line = command_line()
-        save = functools.partial(save_model, diagnosed_model(result, line))
-        written = outputs.write(result, save, keep=True)
+    save = functools.partial(save_model, diagnosed_model(result, command_line()))
+    written = outputs.write(result, save, keep=True)
     more = {"model": written.name(outputs.path("model")), "simd": instruction_set()}
     lines = itertools.chain(as_text(result), ["", table(*ranking_table(result))])
     outputs.finish(written, lambda: as_json(result) | more, lines)

@@ -60,8 +60,7 @@ def command(
     from pendmap.records import files_of, read_experiment
 
     outputs = Outputs.take(given, "identify", files_of(path), default=("model", "plot", "rerun"))
-    with outputs.progress("read"):
-        experiment = read_experiment(path, rate_hz=rate_hz)
+    experiment = read_experiment(path, rate_hz=rate_hz)
     with outputs.progress("identify") as progress:
         report = identify(experiment, methods=methods or None, effects=effects, progress=progress)
 
@@ -76,6 +75,5 @@ def command(
     except InputError:
         finish(Written())
         raise
-    with outputs.progress("write"):
-        written = outputs.write(report, functools.partial(save_model, model), keep=True)
+    written = outputs.write(report, functools.partial(save_model, model), keep=True)
     finish(written)

@@ -28,7 +28,6 @@ def command(*, path: Path, rate_hz: float | None, **given: Any) -> None:  # noqa
     from pendmap.records.summary import as_json, as_text
 
     outputs = Outputs.take(given, "look", files_of(path), default=())
-    with outputs.progress("read"):
-        experiment = read_experiment(path, rate_hz=rate_hz)
+    experiment = read_experiment(path, rate_hz=rate_hz)
     written = outputs.write(experiment)
     outputs.finish(written, lambda: as_json(experiment), [as_text(experiment)])

@@ -16,6 +16,7 @@ import warnings
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.shell_completion import shell_complete
 
 from pendmap import ANALYSES
 from pendmap.errors import FitDiverged, InputError, NotWrittenError, ViewerError, one_line
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 FAILED = 1
 BAD_INPUT = 2
 INTERRUPTED = 130
+_SHELL = "_PENDMAP_COMPLETE"  # Variable in which a shell asks for completion
 _FULL = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)
 """Error numbers of a full disk: the request itself was valid."""
 
@@ -58,10 +60,6 @@ _NAMED = re.compile(
 """Form of messages that refuse a value: ``gamma must be 0 or more, got -1``."""
 
 
-class _ReaderGone(Exception):  # noqa: N818 (nothing is wrong)
-    """The reader of stdout has closed it; click alone would exit with 1."""
-
-
 class _Commands(click.Group):
     """Group whose commands are imported only when called: ``--help`` imports none of them."""
 
@@ -83,22 +81,10 @@ class _Commands(click.Group):
         loaded: click.Command = module.command
         return loaded
 
-    def make_context(self, *args: Any, **more: Any) -> click.Context:  # noqa: ANN401 (of click)
-        """Parse the words; an interrupt is that of :meth:`invoke`."""
-        try:
-            return super().make_context(*args, **more)
-        except KeyboardInterrupt as error:
-            raise click.Abort from error
-
     def invoke(self, ctx: click.Context) -> Any:  # noqa: ANN401 (what the command returns)
         """Run the command; a refused value is named by its option."""
         try:
             return super().invoke(ctx)
-        except BrokenPipeError:
-            raise _ReaderGone from None
-        except KeyboardInterrupt as error:
-            # click writes an empty line for KeyboardInterrupt, but none for Abort.
-            raise click.Abort from error
         except InputError as error:
             called = self.get_command(ctx, ctx.invoked_subcommand or "")
             options = {p.name: p.opts[0] for p in called.params} if called else {}
@@ -209,18 +195,22 @@ def _stoppable(stops: list[int]) -> Iterator[None]:
 def _exit_code(stops: Sequence[int]) -> int:
     COMPLETE.clear()
     try:
-        result = command.main(prog_name="pendmap", standalone_mode=False)
-    except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 (distinguished below)
-        if isinstance(error, click.Abort) and isinstance(error.__cause__, EOFError):
-            # click takes the unexpected end of any file for an interrupt.
-            error = error.__cause__
-        interrupted = isinstance(error, (click.Abort, KeyboardInterrupt))
+        if request := os.environ.get(_SHELL):
+            return shell_complete(command, {}, "pendmap", _SHELL, request)
+        # Not by click's main, which takes the unexpected end of any file for an interrupt.
+        with command.make_context("pendmap", sys.argv[1:]) as context:
+            command.invoke(context)
+    except click.exceptions.Exit as end:
+        return end.exit_code
+    except KeyboardInterrupt:
+        return _interrupted()
+    except Exception as error:  # noqa: BLE001 (distinguished by _failed)
         # After a signal, an error of a library, for example during its import, is due to the
         # signal, except that a stopped trajectory is written and may not fit the disk.
-        if interrupted or (stops and not isinstance(error, NotWrittenError)):
+        if stops and not isinstance(error, NotWrittenError):
             return _interrupted()
         return _failed(error)
-    return result if isinstance(result, int) else 0
+    return 0
 
 
 def _interrupted() -> int:
@@ -234,8 +224,8 @@ def _failed(error: BaseException) -> int:
         case click.exceptions.NoArgsIsHelpError():
             click.echo(error.format_message(), err=True)
             return code
-        case _ReaderGone():
-            # No message, and none from the interpreter at exit.
+        case BrokenPipeError():
+            # The reader is gone: no message, and none from the interpreter at exit.
             _silence()
             return 128 + signal.SIGPIPE
         case click.ClickException():

@@ -17,8 +17,6 @@ from pendmap.cli.show import File, free_name, keep_files, say, table, write_all,
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-_LONG = "8"  # Figure that takes 100 s of a processor (AMD EPYC, family 26)
-
 
 @options.new_command(
     "paper", "pendmap paper 2", "pendmap paper table1", "pendmap paper all --out figures"
@@ -70,8 +68,6 @@ def command(  # noqa: PLR0913 (an option each)
     if plot is not None and not overwrite:
         keep_files([File("plot", plot, "--plot")])
     places = {key: plot or _place(key, out or Path(), overwrite=overwrite) for key in keys}
-    if _LONG in keys and not quiet:
-        click.echo(f"Figure {_LONG} takes some minutes.", err=True)
     written = write_all(_files(places, seed))
     if as_json:
         write_json({"files": written})

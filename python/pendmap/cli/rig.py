@@ -76,27 +76,26 @@ def command(  # noqa: PLR0913 (an option each)
     if plot is not None and not overwrite:
         keep_files([File("plot", plot, "--plot")])
     experiment = virtual_rig.make(request)
-    both = f"{where.experiment}, {where.truth}"
 
-    def write(_: Path) -> str:
+    def write(_: Path) -> Path:
         virtual_rig.write(experiment, where)
-        return both
+        return where.experiment
 
-    files: list[tuple[Callable[[Path], Path | str], Path]] = [(write, where.experiment)]
+    files: list[tuple[Callable[[Path], Path], Path]] = [(write, where.experiment)]
     if plot is not None:
         files.append((functools.partial(_draw, where.experiment), plot))
     written = write_all(files)
-    made = {"experiment": where.experiment, "truth": where.truth} if both in written else {}
+    made = {"experiment": where.experiment, "truth": where.truth} if written else {}
+    made |= {"plot": plot} if plot is not None and written.name(plot) else {}
     if as_json:
-        made |= {"plot": plot} if plot is not None and written.name(plot) else {}
         write_json({name: str(path) for name, path in made.items()})
     elif made and not quiet:
         seconds = sum(run.plan.duration for run in experiment.runs)
         runs = counted(len(experiment.runs), "run")
         say(f"Written: {where.experiment} ({runs}, {seconds:.0f} s)")
         say(f"The truth: {where.truth}")
-        if drawn := written.name(plot):
-            say(f"The records: {drawn}")
+        if "plot" in made:
+            say(f"The records: {plot}")
     written.check()
 
 

@@ -47,7 +47,8 @@ def figure_of(  # noqa: PLR0913 (all of these a user may choose)
         made = result
     else:
         wide = width / _INCH if width else max(size or (0.0,))
-        cells = max(drawing.CELLS, math.ceil(min(style.PIXELS, wide * dpi)))
+        side = wide * dpi if wide * dpi <= style.PIXELS else 0.0  # a larger figure is refused
+        cells = max(drawing.CELLS, math.ceil(side))
         made = registry.of_result(result, layer=layer, cells=cells)
     if colormap is not None:
         made = drawing.in_colours(made, colormap)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap.errors import InputError
+from pendmap.errors import InputError, check_number
 from pendmap.virtual_rig.effects import draw, draws_size
 from pendmap.virtual_rig.effects.base import Drive
 from pendmap.virtual_rig.effects.readings import read
@@ -149,13 +149,12 @@ class Request:
         if self.plans and asked:
             raise InputError(f"one of {asked[0]} and plans must be left out, got both")
         for k, plan in enumerate(self.plans):
-            numbers = (plan.theta, plan.velocity, plan.p, plan.frequency, plan.phase, plan.lab_time)
-            usual = plan.kind in {"free", "forced"} and all(map(math.isfinite, numbers))
-            if not (usual and 1 <= plan.duration <= 3600):  # noqa: PLR2004
-                raise InputError(
-                    f"plan {k} must be free or forced, take 1 to 3600 s and have finite numbers, "
-                    f"got {plan}"
-                )
+            if plan.kind not in {"free", "forced"}:
+                raise InputError(f"kind of plan {k} must be free or forced, got {plan.kind!r}")
+            for name in ("theta", "velocity", "p", "frequency", "phase", "lab_time", "duration"):
+                check_number(f"{name} of plan {k}", getattr(plan, name))
+            if not 1 <= plan.duration <= 3600:  # noqa: PLR2004
+                raise InputError(f"duration of plan {k} must be 1 to 3600 s, got {plan.duration:g}")
 
     @property
     def runs(self) -> tuple[int, int]:
