@@ -20,6 +20,25 @@ from pendmap.records import Experiment, Run
 if TYPE_CHECKING:
     from decays import Floats
     from pendmap.identification import Identification
+    from pendmap.identification.fit import TrajectoryFit
+
+    Fitted = Identification | TrajectoryFit
+
+
+TRUTH = {"w0": 6.2, "c_over_m": 0.0496, "Tr": 0.08}
+"""Parameters of `decay()`."""
+
+
+def scores(result: Fitted, truth: dict[str, float]) -> Floats:
+    """Return the differences of estimates from the truth in standard errors."""
+    known = [result.estimates[name] for name in truth]
+    pairs = zip(known, truth.values(), strict=True)
+    return np.array([(one.value - true) / (one.stderr or np.nan) for one, true in pairs])
+
+
+def agrees(result: Fitted, truth: dict[str, float], errors: float = 4) -> None:
+    """Check that no estimate is further from the truth than a number of standard errors."""
+    assert np.all(np.abs(scores(result, truth)) < errors), result.estimates
 
 
 def written(path: Path, *columns: Floats, names: str = "theta_rad", form: str = "%.8f") -> Path:
@@ -46,7 +65,6 @@ def methods_of(
 def joint_fit(
     time: Floats,
     angle: Floats,
-    *,
     sigma: float | None = None,
     trusted: np.ndarray | None = None,
     **choices: Any,  # noqa: ANN401 (those of fit_from_start)

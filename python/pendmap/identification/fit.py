@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from pendmap.model import Rig
     from pendmap.signal import Floats
 
-
 GROWTH: Final = 4.0  # Factor by which windows grow from stage to stage
 LEVEL: Final = 3.841458820694124  # 95 % point of chi-squared with one degree of freedom
 

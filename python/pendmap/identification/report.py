@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from pendmap.model import Rig
     from pendmap.records import Experiment, Run
 
-
 DRAG: Final = "quadratic_drag"
 """Effect that is tried by default if viscous damping and friction do not explain a record."""
 
@@ -40,7 +39,6 @@ COLUMNS: Final = {
     "offset": "offset (rad)",
 }
 """Columns of the table of methods and their headers; effects' parameters follow."""
-
 
 _SHORT: Final = {"w0": ("w0", "rad/s"), "c_over_m": ("c/m", "1/s"), "Tr": ("Tr", "rad/s^2")}
 """Symbols and units of the parameters that are said first."""
@@ -91,8 +89,7 @@ class IdentificationReport(FitResult):
 
     def text_parts(self) -> tuple[list[tuple[list[str], list[list[str]]]], list[str]]:
         """Return the tables and lines that ``pendmap identify`` prints."""
-        tables = [methods_table(self), table1_table(self)]
-        return tables, as_text(self)
+        return [methods_table(self), table1_table(self)], as_text(self)
 
     @property
     def warnings(self) -> tuple[str, ...]:

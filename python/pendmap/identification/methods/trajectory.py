@@ -20,9 +20,11 @@ from pendmap.identification.methods.base import Identification
 from pendmap.identification.parameters import OFFSET, OPPOSING, SENSOR, opposing
 from pendmap.identification.readings import as_fit_run, reading_of_run
 from pendmap.identification.sensitivity import upper_limit
-from pendmap.identification.turning import TooShortError, rough_start
+from pendmap.identification.turning import TooShortError, rough_start, swinging
 from pendmap.model import Rig
 from pendmap.model.effects import Effect
+from pendmap.records.experiment import texts
+from pendmap.signal.half_cycles import swings
 from pendmap.signal.robust import span
 
 if TYPE_CHECKING:
@@ -32,7 +34,6 @@ if TYPE_CHECKING:
     from pendmap.identification.readings import Reading
     from pendmap.identification.runs import FitRun
     from pendmap.records import Run
-
 
 LACKING: Final = 4.0
 """Widening above which readings have equal weights: else the slowest alone would dominate."""
@@ -155,7 +156,12 @@ def _start_of(start: Rig | Mapping[str, float] | None, run: FitRun, sigma: float
     """Return the starting model: given values, and others from the record's half swings."""
     if isinstance(start, Rig):
         return start
-    rough = rough_start(run.time[run.counted], run.angle[run.counted], sigma) or {}
+    time, theta = run.time[run.counted], run.angle[run.counted]
+    peaks = np.abs(swings(*swinging(time, theta)).peak)
+    if peaks.size and np.median(peaks) > math.pi:
+        text, _ = texts()["angle-unit.wrong"]
+        raise InputError(f"{run.name}: {text.format(largest=peaks.max())}")
+    rough = rough_start(time, theta, sigma) or {}
     known: dict[str, Any] = {**rough, **(start or {})}
     if "w0" not in known:
         raise TooShortError(
