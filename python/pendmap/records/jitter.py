@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats
     from pendmap.signal.local_polynomial import LocalFit
 
-
 SPEED_REACH: Final = 0.7  # Half-width of the polynomials that give speeds, rad of phase
 FALSE_READING: Final = 8.0  # Standard deviations from a median of five that replaces a reading
 CERTAIN_GROWTH: Final = 4.0  # Standard errors of ``tau^2`` above which it is significant

@@ -172,8 +172,6 @@ def test_strong_friction_makes_the_reading_jump(tmp_path: Path) -> None:
 @pytest.mark.parametrize("bias", [-0.3, 0.1])
 def test_a_large_bias_of_a_gyroscope_is_fitted(tmp_path: Path, bias: float) -> None:
     run = read(tmp_path, *rates(release=1.0, bias=bias))
-    assert run.gyroscope is not None
-    assert run.gyroscope.bias == pytest.approx(bias, abs=2e-3)
     report = identify(Experiment(Path(), (run,)), methods=["trajectory"])
     agrees(report.best, TRUTH | {"bias": bias})
     for each in (report, report.best):
@@ -266,7 +264,7 @@ def test_a_rate_in_coarse_steps(tmp_path: Path) -> None:
         assert best[name] == pytest.approx(true, rel=0.02)
 
 
-def test_look_reports_noise_and_bias_of_a_gyroscope(tmp_path: Path) -> None:
+def test_look_reports_the_noise_of_a_gyroscope(tmp_path: Path) -> None:
     there = Experiment(tmp_path, (read(tmp_path, *rates()),))
     assert pendmap.noise_floor(there) == pendmap.noise_floor(there.runs[0])
     two = Experiment(Path(), (there.runs[0],) * 2)
@@ -276,11 +274,9 @@ def test_look_reports_noise_and_bias_of_a_gyroscope(tmp_path: Path) -> None:
     (run,) = summary.as_json(there)["runs"]
     assert run["noise"]["sigma"] == pytest.approx(5e-3, rel=0.05)
     assert run["noise"]["unit"] == "rad/s"
-    assert run["gyroscope_bias"] == pytest.approx(0.01, abs=5e-4)
     json.dumps(run, allow_nan=False)
     text = summary.as_text(there)
     assert "rad/s (0.2" in text
-    assert "+0.0" in next(line for line in text.splitlines() if "  bias " in line)
     render.draw(there, tmp_path / "record.png")
 
 
