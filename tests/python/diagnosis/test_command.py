@@ -228,7 +228,9 @@ def test_a_wrong_unit_is_reported_before_the_verdict(tmp_path: Path, pendmap_com
 
 
 @pytest.mark.thorough
-def test_small_degrees_are_named_with_reserve(tmp_path: Path, pendmap_command: Run) -> None:
+def test_small_degrees_are_doubted_and_no_effect_is_firm(
+    tmp_path: Path, pendmap_command: Run
+) -> None:
     time = np.arange(3000) * 0.02
     theta = 0.05 * np.exp(-0.03 * time) * np.cos(6.0 * time)
     theta += 1e-4 * np.random.default_rng(2).standard_normal(time.size)

@@ -13,6 +13,7 @@ import pytest
 import pendmap
 from decays import decay
 from pendmap.identification.report import as_json
+from pendmap.records.noise import noise_of
 from pendmap.records.summary import as_text
 from recorded import COUNT, clean, experiment, found, motion, read, text
 
@@ -60,10 +61,7 @@ def test_noise_is_estimated_within_a_few_per_cent(rate: float, counts: int) -> N
         count = 2 * np.pi / counts if counts else 0.0
         readings = theta + np.random.default_rng(4).normal(0, noise, theta.size)
         readings = count * np.round(readings / count) if counts else readings
-        run = pendmap.Run(
-            "a", "a", "free", time, readings, np.ones(time.size, bool), count_rad=count
-        )
-        floor = pendmap.noise_floor(run)
+        floor = noise_of(time, readings, count=count)
         truth = float(np.std(readings - theta))
         assert abs(floor.sigma / truth - 1) < 0.05 + 3 * 0.8 / np.sqrt(time.size)
 
@@ -84,9 +82,9 @@ def test_missing_samples_are_told_from_stamps_that_scatter(
 
 
 def test_times_and_steps_are_printed_with_their_digits(tmp_path: Path) -> None:
-    time, _, _ = motion(start=0.002)
+    time, theta, _ = motion(start=0.002)
     path = tmp_path / "a.csv"
-    path.write_text(text((time + 1732209590.125, np.round(motion(start=0.002)[1], 6))))
+    path.write_text(text((time + 1732209590.125, np.round(theta, 6))))
     there = pendmap.read_experiment(path)
     assert "1732209590.125 to 1732209610.125 s" in as_text(there)
     # The last digit of a file is no counter.

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import pendmap
 from damages import DAMAGES, DESCRIPTIONS, one_line, sound
-from recorded import experiment, text
+from recorded import experiment, found, read, text
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -83,10 +83,8 @@ def test_a_damaged_description_is_refused_in_one_line(name: str, tmp_path: Path)
 
 
 def test_a_clean_record_has_no_finding(tmp_path: Path) -> None:
-    path = tmp_path / "record.csv"
-    path.write_text(sound(), encoding="utf-8")
-    (run,) = pendmap.read_experiment(path).runs
-    assert {finding.what for finding in run.findings} <= {"counts-seen"}
+    run = read(tmp_path, sound())
+    assert set(found(run)) <= {"counts-seen"}
     assert run.trusted.all()
 
 
