@@ -16,63 +16,48 @@ if TYPE_CHECKING:
 
     Floats = npt.NDArray[np.float64]
 
-__all__ = ["GRAVITY", "SENSORS", "TRUTH", "column", "experiment", "handled", "readings"]
-
 GRAVITY = 9.81
 TRUTH = {"w0": 6.2, "c_over_m": 0.0496, "Tr": 0.08}
 
-TANGENTIAL = 'direction = "tangential", distance_m = {:g}'
+PLACE = 'direction = "tangential", distance_m = %g'
+# Parameters of a sensor for `readings`, and its entries in [columns]
 SENSORS: dict[str, tuple[dict[str, Any], str]] = {
-    "near": ({"distance": 0.1}, TANGENTIAL.format(0.1)),
-    "far": ({"distance": 0.5}, TANGENTIAL.format(0.5)),
-    "removed": (
-        {"distance": 0.1, "gravity": 0.0},
-        TANGENTIAL.format(0.1) + ", gravity_removed = true",
-    ),
-    "angular": ({"direction": "angular", "noise": 0.2}, 'direction = "angular"'),
+    "near": ({"distance": 0.1}, PLACE % 0.1),
+    "far": ({"distance": 0.5}, PLACE % 0.5),
+    "removed": ({"distance": 0.1, "gravity": 0.0}, PLACE % 0.1 + ", gravity_removed = true"),
+    "angular": ({"direction": "angular", "noise": 0.2}, 'unit = "rad/s2"'),
 }
-"""Parameters of a sensor for :func:`readings`, and its entries in [columns]."""
 
 
 def column(sensor: str) -> str:
     """Return the entry of [columns] that describes the acceleration."""
-    unit = "rad/s2" if sensor == "angular" else "m/s2"
-    return f'{{ name = "acc", unit = "{unit}", {SENSORS[sensor][1]} }}'
+    return f'{{ name = "acc", {SENSORS[sensor][1]} }}'
 
 
-def handled(  # noqa: PLR0913 (the motion of the hand)
-    sensor: str,
-    releases: Sequence[tuple[float, float]],
-    *,
-    carry: float = 1.5,
-    hold: float = 1.5,
-    tremble: float = 0.0,
-    rate: int = 100,
+def handled(
+    sensor: str, releases: Sequence[tuple[float, float]], hold: float = 1.5
 ) -> tuple[Floats, Floats, list[tuple[float, float]]]:
     """Return times, readings, and the interval of free swing of each of several releases.
 
-    The pendulum is carried to each angle (rad) along a quintic, held there, and swings for the
-    given number of seconds; a hand stops it at once. ``tremble`` is the amplitude (rad) of the
-    hand's tremor at 7 Hz.
+    The pendulum is carried to each angle (rad) in 1.5 s along a quintic, held there, and swings for
+    the given number of seconds; a hand stops it at once.
     """
     given = {"gravity": GRAVITY, "noise": 0.02, "distance": 1.0, **SENSORS[sensor][0]}
     noise, gravity = given.pop("noise"), given["gravity"]
-    angular = sensor == "angular"
     parts, free, count, last = [], [], 0, 0.0
+    s = np.arange(150) / 150
     for angle, seconds in releases:
-        s = np.arange(round(carry * rate)) / round(carry * rate)
         way = last + (angle - last) * (10 * s**3 - 15 * s**4 + 6 * s**5)
-        hand = np.append(way, np.full(round(hold * rate), angle))
-        hand += tremble * np.sin(2 * np.pi * 7 * np.arange(hand.size) / rate)
-        bend = np.gradient(np.gradient(hand, 1 / rate), 1 / rate)
-        felt = bend if angular else given["distance"] * bend + gravity * np.sin(hand)
-        _, theta, swing = readings(**given, noise=0.0, release=angle, seconds=seconds, rate=rate)
+        hand = np.append(way, np.full(round(100 * hold), angle))
+        bend = np.gradient(np.gradient(hand, 0.01), 0.01)
+        felt = bend if sensor == "angular" else given["distance"] * bend + gravity * np.sin(hand)
+        _, theta, swing = readings(**given, noise=0.0, release=angle, seconds=seconds)
         parts += [felt, swing[:-1]]
         count += hand.size
-        free.append((count / rate, (count + swing.size - 1) / rate))
+        free.append((count / 100, (count + swing.size - 1) / 100))
         count, last = count + swing.size - 1, float(theta[-1])
     drawn = np.random.default_rng(0).standard_normal(count)
-    return np.arange(count) / rate, np.concatenate(parts) + noise * drawn, free
+    return np.arange(count) / 100, np.concatenate(parts) + noise * drawn, free
 
 
 def readings(  # noqa: PLR0913 (the pendulum and the sensor)

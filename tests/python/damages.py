@@ -134,7 +134,8 @@ TEXTS = {
     "decimal commas between commas": bad(
         lambda s: s.splitlines()[0] + "\n" + s.split("\n", 1)[1].replace(".", ","), "delimiter"
     ),
-    "half a line": said(lambda s: s[:-9], "half-line"),
+    "half a line": said(lambda s: s[:-9], "angle-missing"),
+    "half a line without the angle": said(lambda s: s + "10.01", "unreadable-lines"),
     "nul bytes at the end": said(lambda s: s.encode() + b"\0" * 60, "nul-bytes"),
     "nul bytes inside": said(lambda s: s.encode().replace(b"\n", b"\0\n", 50), "nul-bytes"),
     "noise lines at the start": said(lambda s: "boot v1.2\n~~\xff?\nok\n" + s),
@@ -170,7 +171,7 @@ TEXTS = {
         suffix=".parquet",
     ),
     "parquet with words": bad(
-        parquet(lambda f: f.assign(theta_rad="x")), "no row has a number", ".parquet"
+        parquet(lambda f: f.assign(theta_rad="x")), "no column of angles", ".parquet"
     ),
     "parquet with lists": bad(parquet(lambda f: f.assign(theta_rad=[[x] for x in f.theta_rad])), "", ".parquet"),
     "parquet with switches": said(parquet(lambda f: f.assign(theta_rad=f.theta_rad > 0)), "no-motion", suffix=".parquet"),

@@ -168,7 +168,8 @@ def find_peaks(
         raise InputError("time must increase, it does not")
     drawn = measured(t, x)
     if drawn is not None:
-        t, x = t[drawn.places], x[drawn.places]
+        _, _, places = drawn
+        t, x = t[places], x[places]
     reading = reading_of(t, x, sigma)
     none = dataclasses.replace(Peaks.of((), ()), sigma=reading.sigma)
     count = samples_per_period(t, x)

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from pendmap.records.experiment import Finding, Run
     from pendmap.signal import Floats
 
-
 ONE_RIG: Final = 0.05  # Relative difference of small-swing periods above which rigs differ
 FEWEST_SHARED: Final = 50  # Fewest readings of a duplicate, and of a run without its duplicates
 LEAST_SHARE: Final = 0.1  # Least share of the shorter run in a duplicate

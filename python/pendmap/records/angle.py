@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from pendmap.records.work import Work
     from pendmap.signal import Floats
 
-
 WRAPPED_SPAN: Final = 1.01  # Greatest span of wrapped readings, turns: one turn and some noise
 WRAP_JUMP: Final = 0.75  # Least jump between neighbours that is a wrap, turns
 LARGEST_ANGLE: Final = 1e5  # Greatest plausible angle, rad: about 16,000 turns
@@ -69,22 +68,20 @@ def _finite(work: Work, what: str, *values: Floats) -> Finding | None:
 
 def derived(work: Work) -> Finding | None:
     """Compute the angle from pixels, a velocity or an acceleration, in this order."""
-    if "angle" in work.columns or work.peaks_only:
+    given = "angle" in work.columns or work.peaks_only
+    if "acceleration" in work.extra and (given or {"pixel_x", "velocity"} & work.extra.keys()):
+        work.note("acceleration-unused")
+    if given:
         return None
     if "pixel_x" in work.extra:
         return _circle_angle(work, work.extra.pop("pixel_x"), work.extra.pop("pixel_y"))
-    if "velocity" not in work.extra:
-        return _accelerated(work)
-    rate = work.extra["velocity"]
-    work.theta = angle_of_rate(work.time, rate, np.abs(rate) < LARGEST_ANGLE)
-    work.integrated = True
-    return work.finding("angle-integrated")
-
-
-def _accelerated(work: Work) -> Finding:
-    """Compute the angle from an acceleration alone."""
+    if "velocity" in work.extra:
+        rate = work.extra["velocity"]
+        work.theta = angle_of_rate(work.time, rate, np.abs(rate) < LARGEST_ANGLE)
+        work.integrated = True
+        return work.finding("angle-integrated")
     reading, sensor = work.extra["acceleration"], _placed(work)
-    work.theta, work.accelerometer = _angle_of_acceleration(work.time, reading, sensor, work.where)
+    work.theta, work.accelerometer = _sine_of_angle(work.time, reading, sensor, work.where)
     place = "an angular acceleration"
     if sensor.direction != "angular":
         removed = f"g = {sensor.gravity:g} m/s^2" if sensor.gravity else "gravity removed"
@@ -115,10 +112,10 @@ def _placed(work: Work) -> Accelerometer:
     )
 
 
-def _angle_of_acceleration(
+def _sine_of_angle(
     time: Floats, reading: Floats, sensor: Accelerometer, where: str
 ) -> tuple[Floats, Accelerometer]:
-    """Return the angle of an acceleration alone, right below a quarter turn, and its sensor.
+    """Return the sine of the angle of free swings by an acceleration alone, and its sensor.
 
     Raises InputError if the readings are not those of free swings.
     """
@@ -164,7 +161,13 @@ def _angle_of_acceleration(
             f"{where}: the acceleration reaches {top:.3g} {sensor.unit}, and a swing of this period"
             f" at most {most:.3g}: unit, distance_m, direction or gravity_removed is wrong"
         )
-    return np.arcsin(np.clip(values / sensor.gain, -1, 1)), sensor
+    return values / sensor.gain, sensor
+
+
+def of_sine(work: Work) -> None:
+    """Compute the angle of an accelerometer, right below a quarter turn, from its sine."""
+    if work.angle_source is not None:
+        work.theta = np.arcsin(np.clip(work.theta, -1, 1))
 
 
 def _circle_angle(work: Work, x: Floats, y: Floats) -> Finding:
@@ -189,7 +192,7 @@ def _circle_angle(work: Work, x: Floats, y: Floats) -> Finding:
         )
         a, b, radius = fit.x.tolist()
         rms = math.sqrt(2 * fit.cost / near.sum())
-        error = rms * math.sqrt(float(np.linalg.pinv(fit.jac.T @ fit.jac)[2, 2]))
+        error = rms * float(np.linalg.norm(np.linalg.pinv(fit.jac)[2]))
         away = np.abs(_distances(fit.x, u, v))
         near = away <= 6 * max(normal_scale(away), 1e-9)
     if not (math.isfinite(radius) and 0 < radius < 1e3):
@@ -234,7 +237,4 @@ def wrapped(work: Work) -> Finding | None:
     if not jumps.size or span > WRAPPED_SPAN * math.tau or span < 0.9 * math.tau:
         return None
     work.theta = np.unwrap(work.theta)
-    fastest = float(np.quantile(np.abs(np.diff(work.theta)), 0.999))
-    if fastest > math.pi / 2:
-        work.note("unwrapping-uncertain", step=fastest)
     return work.finding("angle-wrapped", at=jumps + 1, jumps=counted(jumps.size, "jump"))

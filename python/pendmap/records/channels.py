@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.errors import InputError, short_repr
+from pendmap.formatting import listed
 from pendmap.model.quantities import GRAVITY
 from pendmap.records.description import Column
 from pendmap.records.experiment import finding_of
@@ -17,13 +18,12 @@ from pendmap.records.units import CHANNELS, PIVOT_UNITS, name_and_unit, plain, s
 from pendmap.records.work import Work
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping, Sequence
+    from collections.abc import Collection, Mapping
 
     from pendmap.records.description import Description, RunPlan
     from pendmap.records.experiment import Finding
     from pendmap.records.tables import Table
     from pendmap.signal import Floats
-
 
 _MOST_NAMED: Final = 8  # Most columns listed in a message
 # Channels from which an angle can be computed
@@ -117,7 +117,7 @@ def _place(name: str, table: Table, where: str) -> int:
     bare = [name_and_unit(head)[0] for head in table.names]
     if bare.count(name) == 1:
         return bare.index(name)
-    if not table.headed:
+    if not any(table.names):
         raise InputError(f"{where}: {short_repr(name)}: the file has no line of names")
     near = difflib.get_close_matches(name, table.names, 1, 0.6)
     perhaps = f", perhaps {near[0]!r} is meant" if near else ""
@@ -128,13 +128,7 @@ def _place(name: str, table: Table, where: str) -> int:
 
 def _names(table: Table) -> str:
     """Return the headings of a table for a message."""
-    return _listed([name[:40] or "(no name)" for name in table.names], _MOST_NAMED)
-
-
-def _listed(names: Sequence[str], most: int) -> str:
-    """Return the text of the first names, with the number of all if some are omitted."""
-    more = f", ... ({len(names)} in all)" if len(names) > most else ""
-    return ", ".join(map(repr, names[:most])) + more
+    return listed([repr(name[:40] or "(no name)") for name in table.names], _MOST_NAMED)
 
 
 def _check(places: dict[str, int], table: Table, where: str, *, timed: bool) -> None:
@@ -208,7 +202,7 @@ def use_pixels(table: Table, places: dict[str, int], asked: Mapping[str, Column]
 
 def guess(table: Table, places: dict[str, int], *, timed: bool) -> list[Finding]:
     """Assign missing channels by common column names, or by position without names."""
-    if not table.headed:
+    if not any(table.names):
         return _by_position(table, places, timed=timed)
     guessed = _by_name(table, places)
     if "time" in places and any(channel in places for channel in ANGLE_CHANNELS):
@@ -262,22 +256,16 @@ def _by_position(table: Table, places: dict[str, int], *, timed: bool) -> list[F
     if not timed:  # the rate is known: ignore columns that number the readings
         free = [k for k in free if np.any(np.diff(table.values[:, k]) != 1)]
     if "time" not in places and free:
-        k = next((k for k in free if _rises(table.values[:, k])), None)
-        if k is not None:
-            places["time"] = k
-            free.remove(k)
+        steps = np.diff(table.values[:, free], axis=0)
+        rises = np.sum(steps > 0, axis=0) > 0.9 * np.sum(np.isfinite(steps), axis=0)
+        if rises.any():
+            k = places["time"] = free.pop(int(np.argmax(rises)))
             guesses.append(f"column {k + 1} is the time in s")
     if free and not any(channel in places for channel in ANGLE_CHANNELS):
         places["angle"] = free[0]
         guesses.append(f"column {free[0] + 1} is the angle")
     finding = finding_of("columns-guessed.places", names=", ".join(guesses))
     return [finding] if guesses else []
-
-
-def _rises(values: Floats) -> bool:
-    """Return whether nearly all steps of a column are positive."""
-    steps = np.diff(values[np.isfinite(values)])
-    return bool(steps.size and np.mean(steps > 0) > 0.9)
 
 
 def position_of(table: Table, places: Mapping[str, int]) -> int | None:
@@ -317,7 +305,7 @@ def _unused(
     names = tuple(head_of(table, k) for k in rest)
     if not rest:
         return (), []
-    findings = [finding_of("columns-unused", names=_listed(names, MOST_UNUSED))]
+    findings = [finding_of("columns-unused", names=listed([*map(repr, names)], MOST_UNUSED))]
     for k in rest:
         if changes(table.values[:, k]):
             findings += _suggestion(head_of(table, k), channels, plan)

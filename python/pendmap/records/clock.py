@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from pendmap.records.work import Work
     from pendmap.signal import Floats, Indices, Stretch
 
-
 RESTART: Final = 10  # Least decrease at a clock's restart, intervals; fewest samples of each part
 REPORTED_JITTER: Final = 0.02  # Relative spread of the intervals above which jitter is reported
 MOST_UNORDERED: Final = 0.3  # Share of unordered stamps above which the record is refused
@@ -96,26 +95,15 @@ def longest_between(edges: list[int], size: int) -> Stretch:
     return max(zip(edges, ends, strict=True), key=lambda part: part[1] - part[0])
 
 
-def edge_stamps(work: Work) -> Finding | None:
-    """Spread the equal stamps of a log of an encoder's edges over the clock's tick."""
-    same = float(np.mean(np.diff(work.time) == 0))
-    if not same or not _increasing(work.time) or not logs_edges(work.theta):
-        return None
-    work.time = spread_stamps(work.time)
-    return work.finding("time-coarse.edges", percent=100 * same)
-
-
-def _increasing(time: Floats) -> bool:
-    """Return whether stamps increase, some of them equal, as those of a coarse clock."""
-    return bool(np.all(np.diff(time) >= 0) and time[-1] > time[0])
-
-
 def coarse(work: Work) -> Finding | None:
     """Space readings evenly if stamps are in coarse ticks: over the record, else over a tick."""
-    if not _increasing(work.time) or logs_edges(work.theta):
-        return None
     steps = np.diff(work.time)
+    if not np.all(steps >= 0) or not np.any(steps > 0):
+        return None
     same = float(np.mean(steps == 0))
+    if logs_edges(work.theta):
+        work.time = spread_stamps(work.time)
+        return work.finding("time-coarse.edges", percent=100 * same) if same else None
     rise = steps - steps.min(initial=0.0 if same else math.inf)
     usual = float(np.median(steps[steps > 0]))
     rise = rise[rise > REPORTED_JITTER * usual]
@@ -152,10 +140,8 @@ def coarse(work: Work) -> Finding | None:
 def _ticks(
     time: Floats, rise: Floats, steps: Floats, channels: Floats, *, same: float
 ) -> tuple[float, _Even] | None:
-    """Return the tick of coarse stamps and their even times; None for stamps that are not coarse.
-
-    The least changes of the steps are ticks, or the rounding of the written digits of longer ones.
-    """
+    """Return the tick of coarse stamps and their even times; None if stamps are not coarse."""
+    # The least changes of the steps are ticks, or the rounding of the digits of longer ones.
     place, least = np.arange(time.size), float(rise.min())
     usual = float(np.median(steps[steps > 0]))
     rounded = not np.any((rise > 2 * least) & (rise <= 4 * least))

@@ -35,10 +35,11 @@ RATE: Final = "rate_hz"
 LARGEST: Final = 1e12  # Greatest magnitude of a number in a description
 NUMBER: Final = (-LARGEST, LARGEST)
 POSITIVE: Final = (1 / LARGEST, LARGEST)
+RATES: Final = (1e-3, 1e9)  # Sampling rates, Hz
 
 
 def _key(rule: object, default: Any = None) -> Any:  # noqa: ANN401 (of any type)
-    """Return a field whose value in the file follows a rule of :func:`_checked`."""
+    """Return a field whose value in the file follows a rule of :func:`checked`."""
     return dataclasses.field(default=default, metadata={"rule": rule})
 
 
@@ -158,7 +159,7 @@ def _description(content: dict[str, Any]) -> Description:
     return Description(
         {name: value for name, value in rig.items() if value is not None},
         {name: _column(name, value) for name, value in columns.items() if name != RATE},
-        _checked(f"[columns]: {RATE}", columns[RATE], POSITIVE) if RATE in columns else None,
+        checked(f"[columns]: {RATE}", columns[RATE], RATES) if RATE in columns else None,
         reader,
         plans,
     )
@@ -197,10 +198,10 @@ def _parsed(kind: type[T], where: str, value: object, without: Iterable[str] = (
         if field.default is dataclasses.MISSING and name not in table:
             raise InputError(f"{where}: {name} must be given{example}")
     rules = {name: fields[name].metadata["rule"] for name in table}
-    return kind(**{name: _checked(f"{where}: {name}", table[name], rules[name]) for name in table})
+    return kind(**{name: checked(f"{where}: {name}", table[name], rules[name]) for name in table})
 
 
-def _checked(name: str, value: object, rule: Any) -> Any:  # noqa: ANN401 (of any type)
+def checked(name: str, value: object, rule: Any) -> Any:  # noqa: ANN401 (of any type)
     """Return a value that is of a type, a dataclass, in a range, or one of a list."""
     if isinstance(rule, type) and dataclasses.is_dataclass(rule):
         return _parsed(rule, name, value)

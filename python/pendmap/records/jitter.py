@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats
     from pendmap.signal.local_polynomial import LocalFit
 
-
 SPEED_REACH: Final = 0.7  # Half-width of the polynomials that give speeds, rad of phase
 GAP: Final = 0.4  # Share of one interval in the time of a window from which it is a gap
 FALSE_READING: Final = 8.0  # Standard deviations from a median of five that replaces a reading

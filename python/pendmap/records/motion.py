@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from typing import TYPE_CHECKING, Final
 
@@ -66,33 +65,34 @@ def free_motions(work: Work) -> Finding | None:
     """Find the free motions of a record, and the period of small swings."""
     if not work.free:
         return None
-    read = _readings(work)
-    good = read.theta[read.trusted]
-    middle = middle_of(read.time[read.trusted], good)
-    read.middle = float(np.median(good)) if middle is None else middle
-    period = _period(work, read.middle)
+    _measure_noise(work)
+    good = work.theta[work.trusted]
+    middle = 0.0 if work.angle_source is not None else middle_of(work.time[work.trusted], good)
+    middle = float(np.median(good)) if middle is None else middle
+    period = _period(work, middle)
     if period is None:
         return work.finding("no-swing")
-    work.middle, work.period, read.period = read.middle, period, period
+    work.middle, work.period = middle, period
     span = _trusted_span(work)
-    parts = [(a, b) for a, b in between(_still(read, span), *span) if b - a > 5]
-    work.parts = releases(read, parts)
-    return _folded_parts(work, read) if work.angle_source is not None else None
+    parts = [(a, b) for a, b in between(_still(work, span), *span) if b - a > 5]
+    work.parts = releases(work, parts)
+    return None if work.angle_source is None else _below_a_quarter_turn(work)
 
 
-def _folded_parts(work: Work, read: Work) -> Finding | None:
+def _below_a_quarter_turn(work: Work) -> Finding | None:
     """Begin each motion where an acceleration shows swings below a quarter turn."""
-    begins = []
+    parts, late = [], []
     for low, high in work.parts:
-        time, theta = read.time[low:high], read.theta[low:high] - read.middle
-        crossing = swings(time, theta, least=read.limit).crossing
-        folded = time[np.abs(theta) > FOLDED]
+        good = np.flatnonzero(work.trusted[low:high]) + low
+        time, sine = work.time[good], work.theta[good] - work.middle
+        crossing = swings(time, sine, least=work.limit).crossing
+        folded = time[np.abs(sine) > FOLDED]
         after = crossing[crossing > folded[-1]] if folded.size else crossing[:0]
-        begins.append(int(np.searchsorted(work.time, after[0])) if after.size else low)
-    late = [begin for (low, _), begin in zip(work.parts, begins, strict=True) if begin > low]
-    ends = [high for _, high in work.parts]
-    work.parts = [(a, b) for a, b in zip(begins, ends, strict=True) if b - a > 5]
-    times = listed([moment(work.time[k]) for k in late], MOST_LISTED)
+        begin = int(np.searchsorted(work.time, after[0])) if after.size else low
+        late += [moment(work.time[begin])] if begin > low else []
+        parts += [(begin, high)] if high - begin > 5 else []
+    work.parts = parts
+    times = listed(late, MOST_LISTED)
     return work.finding("acceleration-folded", times=times) if late else None
 
 
@@ -100,20 +100,6 @@ def _trusted_span(work: Work) -> Stretch:
     """Return the range of the trusted samples."""
     good = np.flatnonzero(work.trusted)
     return int(good[0]), int(good[-1]) + 1
-
-
-def _readings(work: Work) -> Work:
-    """Return a record with accelerometer readings over the gain in place of their angle."""
-    sensor = work.angle_source
-    if sensor is None:
-        _measure_noise(work)
-        return work
-    readings = work.extra["acceleration"].copy()
-    bad = ~work.trusted
-    readings[bad] = np.interp(work.time[bad], work.time[~bad], readings[~bad])
-    read = dataclasses.replace(work, theta=readings / sensor.gain)
-    _measure_noise(read)
-    return read
 
 
 def _period(work: Work, middle: float) -> float | None:
@@ -149,13 +135,33 @@ def used_motions(work: Work) -> Finding | None:
     """Trust the free motions that are long enough, and set the segments."""
     if not work.parts:
         return None
-    read, span = _readings(work), _trusted_span(work)
-    used = [enough(read, part) for part in work.parts]
+    span = _trusted_span(work)
+    used = [enough(work, part) for part in work.parts]
     if not any(used):
         used[max(range(len(used)), key=lambda k: work.parts[k][1] - work.parts[k][0])] = True
     work.releases = [part for part, use in zip(work.parts, used, strict=True) if use]
+    # The times are those of the used samples; ends of holds are estimated conservatively.
+    spans = [f"{moment(work.time[a])} to {moment(work.time[b - 1])} s" for a, b in work.parts]
+    taken = [text for text, use in zip(spans, used, strict=True) if use]
+    short = [text for text, use in zip(spans, used, strict=True) if not use]
+    if work.angle_source is not None and len(taken) > 1:
+        raise InputError(
+            f"{work.where}: an acceleration without an angle must be of one release, got"
+            f" {len(taken)}, of {listed(taken, MOST_LISTED)}: from_s and to_s in [[run]] of"
+            " experiment.toml choose one, or an angle or a velocity (gyroscope) must be recorded"
+        )
     _settle(work, used, span)
-    return _releases(work, used) if len(used) > 1 else None
+    if len(used) < 2:
+        return None
+    what = "each taken as a run" if len(taken) > 1 else "one is used"
+    number, used_from, less = counted(len(spans), "release"), listed(taken, MOST_LISTED), ""
+    if short:
+        less = f"; {len(short)} of fewer than three swings left out: {listed(short, MOST_LISTED)}"
+    low, high = work.releases[0][0], work.releases[-1][1] - 1
+    ends = float(work.time[low]), float(work.time[high])
+    return work.finding(
+        "several-releases", span=ends, releases=number, used=used_from, what=what, short=less
+    )
 
 
 def _settle(work: Work, used: list[bool], span: Stretch) -> None:
@@ -172,23 +178,6 @@ def _settle(work: Work, used: list[bool], span: Stretch) -> None:
         segments.append(_segment(work, "motion", (span[1], work.time.size), used=False))
     work.segments = segments
     work.trusted &= trusted
-
-
-def _releases(work: Work, used: list[bool]) -> Finding:
-    """Return the finding about the releases that are used and those that are too short."""
-    spans = [f"{moment(work.time[a])} to {moment(work.time[b - 1])} s" for a, b in work.parts]
-    taken = [span for span, use in zip(spans, used, strict=True) if use]
-    short = [span for span, use in zip(spans, used, strict=True) if not use]
-    what = "each taken as a run" if len(taken) > 1 else "one is used"
-    # The times are those of the used samples; ends of holds are estimated conservatively.
-    number, used_from, less = counted(len(spans), "release"), listed(taken, MOST_LISTED), ""
-    if short:
-        less = f"; {len(short)} of fewer than three swings left out: {listed(short, MOST_LISTED)}"
-    low, high = work.releases[0][0], work.releases[-1][1] - 1
-    span = float(work.time[low]), float(work.time[high])
-    return work.finding(
-        "several-releases", span=span, releases=number, used=used_from, what=what, short=less
-    )
 
 
 def _between(work: Work, part: Stretch, *, first: bool) -> list[Segment]:

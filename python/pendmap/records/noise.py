@@ -1,15 +1,8 @@
 """Noise of a record, estimated without a model of the pendulum.
 
-The noise is the residual of local polynomials over the filter's gain. Three faults are treated:
-
-- Slow sampling leaves motion in the residual: the degree is raised until the residual no longer
-  decreases.
-- Readings that share a coarse count have equal errors: samples at least a count apart are fitted
-  instead. For slower motion the estimate is count/sqrt(12), the lower bound.
-- Windows with outliers beyond eight robust standard deviations, among samples of similar speed, are
-  excluded; the noise is the root mean square of the others.
-
-Correlated noise is underestimated.
+The noise is the residual of local polynomials over the filter's gain. With slow sampling the degree
+is raised until the residual no longer decreases. Readings that share a coarse count have equal
+errors: samples at least a count apart are fitted; for slower motion the noise is count/sqrt(12).
 """
 
 from __future__ import annotations
@@ -22,7 +15,7 @@ import numpy as np
 
 from pendmap.errors import InputError, short_repr
 from pendmap.records.experiment import Experiment, Run
-from pendmap.records.jitter import SpeedLaw, law_of, speed_of
+from pendmap.records.jitter import DITHERED, SpeedLaw, law_of, speed_of
 from pendmap.records.resolution import step_of
 from pendmap.signal.local_polynomial import local_fit
 from pendmap.signal.robust import broad_scale, widened
@@ -35,10 +28,8 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats, Mask
     from pendmap.signal.local_polynomial import LocalFit
 
-
 SLOW_SAMPLING: Final = 0.06  # Phase between samples, rad, above which quartics leave motion
 WAY_PHASE: Final = 0.25  # Phase over which displacements are measured, rad, unless one interval
-DITHERED: Final = 0.55  # Noise over count above which neighbouring errors are independent
 CLEAR_WAY: Final = 4  # Least displacement from which a speed is computed, counts
 TOO_FEW: Final = 0.3  # Phase between samples, rad, above which polynomials fail: upper bound only
 OUTLIER: Final = 8.0  # Standard deviations above which a residual is an outlier

@@ -26,9 +26,6 @@ if TYPE_CHECKING:
     from pendmap.records.work import Work
     from pendmap.signal import Floats, Indices, Mask
 
-    _Group = slice | Indices
-
-
 SUSPECT: Final = 10.0  # Local standard deviations of a residual above which it is examined
 SCALE_SAMPLES: Final = 151  # Samples from which the local standard deviation is estimated
 PASSES: Final = 8  # Most searches for outliers; each may reveal one next to another
@@ -79,13 +76,9 @@ def outliers(work: Work) -> Finding | None:
     for jump in work.jumps:
         moved[jump.at :] += jump.size
     work.bridged = theta + moved
-    return _distrust(work, np.flatnonzero(false & work.trusted), work.theta - moved - theta, "rad")
-
-
-def _distrust(work: Work, at: Indices, away: Floats, unit: str) -> Finding | None:
-    """Mark outliers and report the greatest deviation."""
-    worst = float(np.max(np.abs(away[at]), initial=0.0))
-    return work.distrust(at, "outliers", "outlier", worst=worst, unit=unit)
+    at, away = np.flatnonzero(false & work.trusted), np.abs(work.theta - moved - theta)
+    worst = np.max(away[at], initial=0.0)
+    return work.distrust(at, "outliers", "outlier", worst=worst, unit="rad")
 
 
 def _bridge(time: Floats, theta: Floats, false: Mask) -> None:
@@ -96,7 +89,7 @@ def _bridge(time: Floats, theta: Floats, false: Mask) -> None:
 
 def _judged(
     work: Work, theta: Floats, at: Indices, scale: Floats
-) -> list[tuple[int, _Group, Jump | None]]:
+) -> list[tuple[int, slice | Indices, Jump | None]]:
     """Return suspects, with outliers and jumps; jumps near outliers are judged after them."""
     verdicts = [
         (k, *_judge(work.time, theta, k, sigma, work.count))
@@ -134,7 +127,7 @@ def _suspects(work: Work, theta: Floats) -> tuple[Indices, Floats]:
 
 def _judge(
     time: Floats, theta: Floats, k: int, sigma: float, count: float
-) -> tuple[_Group, Jump | None]:
+) -> tuple[slice | Indices, Jump | None]:
     """Return the outliers around ``k``, and the jump there or None."""
     low, high = max(k - SIDE, 0), min(k + SIDE + 1, theta.size)
     t, part = time[low:high] - time[k], theta[low:high] - theta[k]
@@ -272,7 +265,8 @@ def spikes(work: Work) -> Finding | None:
     at = fit.middle[(size > limit) & (np.abs(away[fit.middle]) > limit)]
     if at.size > MOST_OUTLIERS * values.size:
         return None
-    return _distrust(work, at, away, "rad/s" if sensor is None else sensor.unit)
+    worst, unit = np.max(np.abs(away[at]), initial=0.0), "rad/s" if sensor is None else sensor.unit
+    return work.distrust(at, "outliers", "outlier", worst=worst, unit=unit)
 
 
 def integrate_again(work: Work) -> None:

@@ -9,11 +9,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, TypeAlias
 
-from pendmap.errors import InputError, check_number, short_repr
+from pendmap.errors import InputError, short_repr
 from pendmap.formatting import counted, listed
 from pendmap.records.across import checked_together
 from pendmap.records.channels import channels_of
-from pendmap.records.description import NAME, Description, RunPlan, read_description
+from pendmap.records.description import NAME, RATES, Description, RunPlan, checked, read_description
 from pendmap.records.experiment import Experiment, Finding, Run, finding_of
 from pendmap.records.rod_sensors import gyroscope_of
 from pendmap.records.rules import OF_RELEASE, RULES, apply
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
     Records: TypeAlias = Experiment | Run | pd.DataFrame | str | os.PathLike[str]
 
-
 # Suffixes of the files that are records in a folder without a description
 TABLES: Final = (".csv", ".tsv", ".txt", ".dat", ".parquet", ".pq", ".xlsx")
 _FORMS: Final = (
@@ -36,8 +35,6 @@ _FORMS: Final = (
 )
 FRAME: Final = "DataFrame"  # Name of a record that has no file
 _SHOWN: Final = 3  # Names of records in the name of several together
-LEAST_RATE: Final = 1e-3  # Least sampling rate, Hz
-MOST_RATE: Final = 1e9  # Greatest sampling rate, Hz
 
 
 def files_of(path: str | os.PathLike[str]) -> list[Path]:
@@ -99,9 +96,7 @@ def read_experiment(
     >>> pendmap.read_experiment("run.csv").runs[0].theta.size
     2000
     """
-    rate = None if rate_hz is None else check_number("rate_hz", rate_hz)
-    if rate is not None and not LEAST_RATE <= rate <= MOST_RATE:
-        raise InputError(f"rate_hz must be {LEAST_RATE:g} to {MOST_RATE:g} Hz, got {rate:g}")
+    rate = None if rate_hz is None else checked("rate_hz", rate_hz, RATES)
     if isinstance(path, str | os.PathLike):
         place = Path(path)
         planned = _planned(place)
@@ -114,8 +109,8 @@ def read_experiment(
         tables = {FRAME: (table_of(path, FRAME), "")}
         runs, findings = _runs(place, RunPlan(FRAME), planned, tables, FRAME)
     digests = {run.file: run.sha256 for run in runs if run.sha256}
-    checked, together = checked_together(runs)
-    return Experiment(place, checked, planned.known, (*findings, *together), digests)
+    unique, together = checked_together(runs)
+    return Experiment(place, unique, planned.known, (*findings, *together), digests)
 
 
 def experiment_of(
@@ -146,11 +141,11 @@ def experiment_of(
         before[run.name] += 1
         name = f"{run.name} ({before[run.name]})" if before[run.name] > 1 else run.name
         runs.append(run if name == run.name else dataclasses.replace(run, name=name))
-    checked, together = checked_together(runs)
+    unique, together = checked_together(runs)
     findings = dict.fromkeys([*(finding for part in parts for finding in part.findings), *together])
     digests = {file: digest for part in parts for file, digest in part.sha256.items()}
     place = Path(listed([part.path.name for part in parts], _SHOWN))
-    return Experiment(place, checked, known, tuple(findings), digests)
+    return Experiment(place, unique, known, tuple(findings), digests)
 
 
 def _experiment(records: object, rate_hz: float | None) -> Experiment:

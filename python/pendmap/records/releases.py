@@ -17,11 +17,11 @@ if TYPE_CHECKING:
     from pendmap.records.work import Work
     from pendmap.signal import Floats, Indices, Stretch
 
-
 RELEASE_RISE: Final = 0.1  # Relative growth of a swing that only a hand causes
 LONG_HALF: Final = 1.4  # Duration of a half cycle, over the usual one, that only a hand causes
 GAP: Final = 4.0  # Intervals without a reading that make the duration of a half cycle uncertain
 HELD_LONGER: Final = 1.5  # Delay, over that of a release from rest, above which there is a hold
+LEFT: Final = 0.2  # Angle, rad, or a quarter of it, by which a motion has left a hold
 NEAR_UPRIGHT: Final = 0.05  # Sine of an angle below which a release is too slow to detect
 FEWEST_HALF_CYCLES: Final = 5  # Fewest half cycles of a release that is a run, about three swings
 BETWEEN_LEVELS: Final = 0.02  # Greatest share of samples between the two levels of a trigger
@@ -62,7 +62,15 @@ def enough(work: Work, part: Stretch) -> bool:
     return half.peak.size >= FEWEST_HALF_CYCLES
 
 
-def grown(work: Work, part: Stretch) -> list[Stretch]:
+def _let_go(work: Work, good: Indices, until: int) -> int:
+    """Return the index at which a motion has left a hold; ``until`` it first passes the middle."""
+    fall = good[(work.time[good] > work.time[until] - 0.3 * work.period) & (good < until)]
+    away = np.abs(work.theta[fall] - work.middle)
+    held = fall[away > max(0.75 * away.max(initial=0.0), away.max(initial=0.0) - LEFT)]
+    return int(held[-1]) + 1 if held.size else until
+
+
+def grown(work: Work, part: Stretch) -> list[Stretch]:  # noqa: C901 (a sign of a hand each)
     """Divide a motion where a hand took the pendulum: swings that grow or last too long."""
     from scipy.ndimage import median_filter
 
@@ -84,7 +92,12 @@ def grown(work: Work, part: Stretch) -> list[Stretch]:
     for k in np.flatnonzero(steps > GAP * np.median(steps)).tolist():
         long &= (half.crossing[1:] < time[k]) | (half.crossing[:-1] > time[k + 1])
     # The half cycle before may be that of the hand, too.
-    hands = [(places[max(k - 1, 0)], places[k + 1]) for k in np.flatnonzero(long).tolist()]
+    hands = [
+        (places[max(k - 1, 0)], _let_go(work, good, places[k + 1]))
+        for k in np.flatnonzero(long).tolist()
+    ]
+    if work.trusted[high:].any() and abs(theta[-1]) > RELEASE_RISE * size.max():
+        hands.append((places[-2], high))  # a hold follows
     before = np.abs(theta[time < crossing[0]])
     if np.argmax(before) and (1 + RELEASE_RISE) * before.max() + 2 * work.limit < size[1]:
         hands.append((low, places[int(np.argmax(size)) + 1]))  # pushed from rest
@@ -102,8 +115,7 @@ def grown(work: Work, part: Stretch) -> list[Stretch]:
             while top + 1 < pairs.size and pairs[top + 1] > pairs[top] * 1.001:
                 top += 1
             top += int(np.argmax(size[top : top + 2]))
-            # After a hold of unknown length the motion is free where it first passes the middle.
-            hands.append((places[at + 1], places[top + 1]))
+            hands.append((places[at + 1], _let_go(work, good, places[top + 1])))
             top = min(top, pairs.size - 1)
             least, at, k = pairs[top], top, top
         k += 1

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from pendmap.records.work import Work
     from pendmap.signal import Floats
 
-
 NYQUIST: Final = 2.0  # Fewest readings per period of the drive that resolve it
 GAIN_KNOWN: Final = 0.1  # Half-width of the gain's 95 % interval above which it is reported
 LEAST_USED: Final = 0.1  # Share of readings in motion used by a fit below which a warning is given

@@ -1,16 +1,9 @@
 """Accelerometers and gyroscopes on the rod, and the angle that their readings give.
 
-An accelerometer measures acceleration less gravity. At the distance r from the pivot that is
-
-    tangential, toward positive theta    r th'' + g sin(th)
-    radial, toward the pivot             r th'^2 + g cos(th)
-
-and without g if the phone removes gravity ("linear acceleration"). An angular acceleration th''
-does not depend on the position. A free swing without damping has ``th'' = -w0**2 sin(th)``: a
-tangential sensor reads ``(g - r w0**2) sin(th)``, which is unambiguous below a quarter turn.
-
-A gyroscope reads th' plus a bias; white noise of the rate is a random walk of its integral, so the
-rate itself is fitted. Both angles serve as initial guess of a fit and for figures.
+At the distance r from the pivot an accelerometer reads ``r th'' + g sin(th)`` across the rod, and
+``r th'^2 + g cos(th)`` along it; without g if the phone removes gravity. Across the rod a free
+swing without damping gives ``(g - r w0**2) sin(th)``, unambiguous below a quarter turn. A gyroscope
+reads th' plus a bias. Both angles serve as initial guess of a fit and for figures.
 """
 
 from __future__ import annotations
@@ -28,10 +21,8 @@ if TYPE_CHECKING:
     from pendmap.records.description import Column, Direction
     from pendmap.signal import Floats, Mask
 
-
 # Example of a sensor's position in [columns]
 PLACE_EXAMPLE: Final = 'acceleration = { direction = "tangential", distance_m = 0.25 }'
-
 OVER_THE_TOP: Final = 4 * math.pi  # Range of angles above which a record contains rotations, rad
 FEWEST_PEAKS: Final = 4  # Fewest turning points from which a drift or a period is estimated
 
@@ -77,7 +68,6 @@ class Gyroscope:
     """Gyroscope from whose readings alone the angle was computed."""
 
     w0: float  # rad/s, from speeds in the middle of swings
-    bias: float = math.nan  # rad/s, from the drift of the angle; NaN if unknown
 
     @property
     def gain(self) -> float:
@@ -112,19 +102,17 @@ def angle_of_rate(time: Floats, rate: Floats, good: Mask | None = None) -> Float
 
 
 def gyroscope_of(time: Floats, theta: Floats, rate: Floats) -> Gyroscope:
-    """Return the gyroscope with ``w0`` and bias estimated from a rate and its integral."""
+    """Return the gyroscope with ``w0`` estimated from a rate and its integral."""
     half = swings(time, theta)
-    bias = math.nan
-    if np.ptp(theta - np.median(theta)) <= OVER_THE_TOP and half.peak_time.size >= FEWEST_PEAKS:
-        # The removed line has the slope of the bias; the median is robust to outliers.
-        bias = float(np.median((rate[1:] + rate[:-1]) / 2 - np.diff(theta) / np.diff(time)))
-    speed, size = np.abs(rate - np.nan_to_num(bias)), np.abs(half.peak)
+    # The removed line has the slope of the bias; the median is robust to outliers.
+    bias = float(np.median((rate[1:] + rate[:-1]) / 2 - np.diff(theta) / np.diff(time)))
+    speed, size = np.abs(rate - bias), np.abs(half.peak)
     swung = (size[:-1] < math.pi) & (size[1:] < math.pi)
     if not np.any(swung):
         # A pendulum rotates if its greatest speed exceeds 2 w0.
-        return Gyroscope(float(np.max(speed)) / 2 or 1.0, bias)
+        return Gyroscope(float(np.max(speed)) / 2 or 1.0)
     # The energy of a swing gives th' = 2 w0 sin(A/2) in the middle.
     middle = (size[:-1] + size[1:]) / 2
     passing = np.interp(half.crossing[1:-1], time, speed)[swung]
     w0 = float(np.sum(passing) / np.sum(2 * np.sin(middle[swung] / 2)))
-    return Gyroscope(w0, bias)
+    return Gyroscope(w0)

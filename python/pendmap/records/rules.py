@@ -1,12 +1,9 @@
 """The rules of reading: all checks of a record, in the order in which they run.
 
 A rule is a function of the record that is being read (:class:`pendmap.records.work.Work`). It may
-correct the record, leave samples out or mark them as not for fitting. It returns a finding, which
-says what is wrong, where, what was done and what it means for errors, or None; it raises InputError
-where no record is left. A new rule is one function, in the file of its subject, and one line here.
-
-What comes before a record has lists of its own: kinds of files in ``tables.py`` (``READERS``),
-names and units of columns in ``units.py`` (``CHANNELS``).
+correct the record, leave samples out or mark them as not for fitting. It returns a finding or None,
+and raises InputError where no record is left. A new rule is one function, in the file of its
+subject, and one line here.
 """
 
 from __future__ import annotations
@@ -16,10 +13,10 @@ from typing import TYPE_CHECKING, Final
 from pendmap.records import (
     angle,
     clock,
-    cross_checks,
     motion,
     noise,
     outliers,
+    pivot,
     releases,
     resolution,
     samples,
@@ -51,7 +48,6 @@ RULES: Final[Rules] = (
     ("always", clock.missing),
     ("always", clock.stopped),
     ("always", clock.restarted),
-    ("always", clock.edge_stamps),
     ("always", clock.coarse),
     ("always", clock.repeated),
     ("always", clock.unordered),
@@ -91,15 +87,13 @@ RULES: Final[Rules] = (
     ("moves", releases.marked),
     ("moves", motion.used_motions),
     ("moves", motion.held_or_at_rest),
-    # Other channels
-    ("moves", cross_checks.velocity),
-    ("moves", cross_checks.acceleration),
-    ("driven", cross_checks.pivot_unit),
+    ("on rod", angle.of_sine),
+    ("driven", pivot.pivot_unit),
     # What a fit can tell
     ("moves", resolution.used_share),
     ("moves", resolution.drive),
     ("moves", resolution.gain),
-    ("sampled", cross_checks.pivot_steps),
+    ("sampled", pivot.pivot_steps),
 )
 # Rules of each release of a record
 OF_RELEASE: Final[Rules] = (("moves", motion.zero), ("moves", noise.grows))

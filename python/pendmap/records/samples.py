@@ -13,16 +13,14 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.formatting import counted
-from pendmap.records.noise import DITHERED, FARTHEST, fastest
+from pendmap.records.noise import fastest
 from pendmap.records.resolution import step_of
-from pendmap.signal.local_polynomial import local_fit
-from pendmap.signal.robust import equal_runs, normal_scale
+from pendmap.signal.robust import equal_runs
 
 if TYPE_CHECKING:
     from pendmap.records.experiment import Finding
     from pendmap.records.work import Work
     from pendmap.signal import Floats, Indices
-
 
 EQUAL_READINGS: Final = 5  # Fewest consecutive equal readings that may be clipped or frozen
 FINEST: Final = 3e-5  # Step below which it is the last written digit, rad
@@ -32,10 +30,6 @@ VANISHED: Final = 0.1  # Differences between readings, over the largest, below w
 FEWEST_SAMPLES: Final = 200  # Fewest samples in which interpolation is searched for
 INTERVALS: Final = 60  # Number of intervals between readings that are examined
 READINGS_A_PERIOD: Final = 5.0  # Fewest readings per period of an interpolated record
-SMOOTH_NEIGHBOURS: Final = 0.3  # Greatest noise of interpolated neighbours, over the full noise
-INDEPENDENT: Final = 0.7  # Noise at a spacing, over the greatest, above which it is independent
-DIGITS: Final = 3e-6  # Noise, over the range, below which it is rounding of digits
-FOLLOWED: Final = 1.3  # Residual of a quartic over that of a sextic above which motion remains
 _EVEN: Final = 1e-3  # Greatest relative deviation of an interval in an evenly sampled record
 
 
@@ -111,12 +105,6 @@ def frozen(work: Work) -> Finding | None:
 
 def _abrupt(work: Work, low: int, high: int) -> bool:
     """Return whether a plateau is flatter than a turning point, within v tau/2 of its extreme."""
-    noise = float(np.median(np.abs(np.diff(work.theta, 2)))) if work.theta.size > 2 else 0.0
-    return _missed(work, low, high) > 2 * work.count + 3 * min(noise, 0.01)
-
-
-def _missed(work: Work, low: int, high: int) -> float:
-    """Return the expected displacement during a plateau from the speeds at its borders, rad."""
     reach = max(high - low, 4)
     sides = (slice(max(low - reach, 0), low), slice(high, high + reach))
     slopes = [
@@ -124,20 +112,13 @@ def _missed(work: Work, low: int, high: int) -> float:
         for side in sides
         if work.theta[side].size > 1
     ]
-    return min(slopes, default=-math.inf) * float(work.time[high - 1] - work.time[low]) / 4
+    missed = min(slopes, default=-math.inf) * float(work.time[high - 1] - work.time[low]) / 4
+    noise = float(np.median(np.abs(np.diff(work.theta, 2)))) if work.theta.size > 2 else 0.0
+    return missed > 2 * work.count + 3 * min(noise, 0.01)
 
 
-@dataclasses.dataclass(frozen=True)
-class Resampled:
-    """Interpolation of a resampled record, and indices of its readings."""
-
-    made: str  # a key of VANISHING_ORDER; empty if detected from the noise alone
-    ratio: int  # samples per reading
-    places: Indices  # indices of the readings
-
-
-def measured(time: Floats, theta: Floats) -> Resampled | None:
-    """Return the readings of a record with interpolated samples; None if all may be readings."""
+def measured(time: Floats, theta: Floats) -> tuple[str, int, Indices] | None:
+    """Return kind and ratio of interpolation, and indices of the readings; None if all are."""
     if theta.size < FEWEST_SAMPLES or np.ptp(theta) == 0:
         return None
     steps = np.diff(time)
@@ -153,9 +134,8 @@ def measured(time: Floats, theta: Floats) -> Resampled | None:
             if _share(theta[begin:], ratio, order)[0] < VANISHED:
                 share, first = _share(theta, ratio, order, blocks=theta.size)
                 if share < VANISHED:
-                    return Resampled(made, ratio, np.arange(first, theta.size, ratio))
-    stride = _independent(time[begin:], theta[begin:], FARTHEST / (quickest * interval))
-    return Resampled("", stride, np.arange(0, theta.size, stride)) if stride > 1 else None
+                    return made, ratio, np.arange(first, theta.size, ratio)
+    return None
 
 
 def _share(theta: Floats, ratio: int, order: int, blocks: int = INTERVALS) -> tuple[float, int]:
@@ -176,49 +156,21 @@ def _share(theta: Floats, ratio: int, order: int, blocks: int = INTERVALS) -> tu
     return (float(within[first]) / largest if largest > 0 else 1.0), first
 
 
-def _independent(time: Floats, theta: Floats, farthest: float) -> int:
-    """Return the spacing, in samples, at which noise is independent; 1 if neighbours' noise is."""
-    strides = [1 << k for k in range(12) if 1 << k <= min(farthest, theta.size / FEWEST_SAMPLES)]
-    noise, whole = [], []
-    for stride in strides:
-        part = slice(0, max(10, 2 * stride) * FEWEST_SAMPLES)
-        t, x = time[part], theta[part]
-        low, high = (
-            normal_scale(local_fit(t, x, degree=degree, points=points, stride=stride).residual)
-            for degree, points in ((4, 9), (6, 11))
-        )
-        # Motion remains in the residual of a quartic but not in that of a sextic.
-        noise.append(high if low < FOLLOWED * high else 0.0)
-        whole.append(high)
-    most = max(noise, default=0.0)
-    count = step_of(theta)
-    if (
-        most <= max(DITHERED * count, DIGITS * float(np.ptp(theta)))
-        or whole[0] > SMOOTH_NEIGHBOURS * most
-    ):
-        return 1
-    return strides[next((k for k, one in enumerate(noise) if one > INDEPENDENT * most), 0)]
-
-
 def interpolated(work: Work) -> Finding | None:
     """Keep only the readings of an interpolated record."""
     readings = measured(work.time, work.theta)
-    if readings is None or not readings.made:
+    if readings is None:
         return None
+    made, ratio, places = readings
     samples = work.time.size
     rate = (samples - 1) / float(work.time[-1] - work.time[0])
-    how = "each held" if readings.made == "held" else f"{readings.made} between"
-    from_hz, to_hz = _hertz(rate / readings.ratio), _hertz(rate)
+    how = "each held" if made == "held" else f"{made} between"
+    from_hz, to_hz = f"{rate / ratio:.6g} Hz", f"{rate:.6g} Hz"
     if work.pivot:
         # The pivot may have been read at every sample.
         return work.finding("interpolated.pivot", from_hz=from_hz, to_hz=to_hz, how=how)
-    work.keep(readings.places)
-    number = counted(readings.places.size, "reading")
+    work.keep(places)
+    number = counted(places.size, "reading")
     return work.finding(
         "interpolated", from_hz=from_hz, to_hz=to_hz, how=how, readings=number, samples=samples
     )
-
-
-def _hertz(rate: float) -> str:
-    """Return a frequency as text."""
-    return f"{rate / 1000:.4g} kHz" if rate >= 1000 else f"{rate:.4g} Hz"

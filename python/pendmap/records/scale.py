@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from pendmap.records.work import Work
     from pendmap.signal import Floats, Indices
 
-
 FEWEST_PERIODS: Final = 6  # Fewest periods that are analysed
 LARGEST_SWING: Final = 3.0  # Largest amplitude, rad, at which the increase of the period is used
 LEAST_ERROR: Final = 1e-3  # Least relative error of a scale factor
@@ -195,7 +194,7 @@ def radians(work: Work) -> Finding | None:
     largest = float(np.max(periods.amplitude))
     if largest <= math.pi:  # swings are possible
         return None
-    if largest * DEGREE > math.pi or _channel(work) in work.declared:
+    if largest * DEGREE > math.pi or ("velocity" if work.integrated else "angle") in work.declared:
         return work.finding("angle-unit.wrong", largest=largest)
     work.theta *= DEGREE
     if work.integrated:
@@ -204,11 +203,6 @@ def radians(work: Work) -> Finding | None:
     work.estimated_step *= DEGREE
     read = "velocities are degrees a second" if work.integrated else "angles are degrees"
     return work.finding("angle-unit.degrees", read=read, largest=largest)
-
-
-def _channel(work: Work) -> str:
-    """Return the channel whose unit is that of the angle."""
-    return "velocity" if work.integrated else "angle"
 
 
 def curvature(work: Work) -> Finding | None:
@@ -231,7 +225,7 @@ def curvature(work: Work) -> Finding | None:
         error=error,
         factor=factor,
         spread=spread,
-        channel=_channel(work),
+        channel="velocity" if work.integrated else "angle",
     )
 
 

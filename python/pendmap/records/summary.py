@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 UNIT_FINDINGS: Final = frozenset(("angle-scale", "angle-unit", "pivot-unit", "time-unit"))
 # Findings that are reported before any result
 DOUBTFUL: Final = UNIT_FINDINGS | {"few-used", "motor-column", "rigs-differ"}
-SCALE_FINDING: Final = "angle-scale"  # Unit finding that an effect can cause, too
 
 
 def as_json(experiment: Experiment) -> dict[str, Any]:
@@ -64,7 +63,6 @@ def _run(run: Run) -> dict[str, Any]:
         "count_rad": run.count_rad or None,
         "peaks_only": run.peaks_only,
         "noise": dataclasses.asdict(noise_floor(run)) | {"unit": noise_unit(run)},
-        "gyroscope_bias": _bias(run),
         "segments": [dataclasses.asdict(segment) for segment in run.segments],
         "findings": [dataclasses.asdict(finding) for finding in run.findings],
     }
@@ -111,9 +109,6 @@ def _lines(run: Run) -> Iterator[str]:
         yield f"  pivot     {ways or 'no numbers'}"
     if not run.peaks_only:
         yield f"  noise     {noise_said(noise_floor(run), noise_unit(run))}"
-    if (bias := _bias(run)) is not None:
-        text = f"{bias:+.3g} rad/s, reading of the gyroscope at rest by the drift of the angle"
-        yield f"  bias      {text}; left to the fit"
     for segment in run.segments:
         used = "for fitting" if segment.used else "not for fitting"
         yield f"  {segment.what:<9} {moment(segment.from_s)} to {moment(segment.to_s)} s, {used}"
@@ -145,7 +140,7 @@ def doubt_lines(experiment: Experiment, *runs: Run) -> Iterator[str]:
 def doubt_keys(experiment: Experiment, *runs: Run) -> set[str]:
     """Return the keys of uncorrected doubtful findings, without the scale of the angle."""
     keys = {finding.what for _, finding in experiment.findings_of(runs) if _doubted(finding)}
-    return keys - {SCALE_FINDING}
+    return keys - {"angle-scale"}  # an effect can cause it, too
 
 
 def unit_wrong(experiment: Experiment, *runs: Run) -> bool:
@@ -169,12 +164,6 @@ def _doubted(finding: Finding) -> bool:
 def noise_unit(run: Run) -> str:
     """Return the unit of :func:`noise_floor`."""
     return "rad" if run.gyroscope is None else run.gyroscope.unit
-
-
-def _bias(run: Run) -> float | None:
-    """Return the bias of a gyroscope, rad/s; None if unknown."""
-    bias = math.nan if run.gyroscope is None else run.gyroscope.bias
-    return bias if math.isfinite(bias) else None
 
 
 def noise_said(noise: NoiseFloor, unit: str = "rad") -> str:

@@ -21,7 +21,6 @@ from pendmap.records.units import CHANNELS
 from pendmap.records.workbooks import WORKBOOK, sheet_text
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
     from pathlib import Path
 
     import pandas as pd
@@ -44,7 +43,10 @@ SEPARATORS: Final = (
 )
 _NUMBER: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 _NOTHING: Final = frozenset(
-    ("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "inf", "+inf", "-inf", "infinity")
+    (
+        *("", "nan", "na", "n/a", "null", "none", "-", "--", "inf", "+inf", "-inf", "infinity"),
+        *("#n/a", "#div/0!", "#name?", "#null!", "#num!", "#ref!", "#value!"),  # of Excel
+    )
 )
 # Words that loggers write for the levels of a trigger
 _LEVELS: Final = {
@@ -59,7 +61,6 @@ LARGEST_READING: Final = 1e18  # Largest reading; larger ones (2e18: ns since 19
 _DATE: Final = re.compile(
     r'\s*"?(\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d(?:([.,])\d+)?(?:Z|[+-]\d\d:?\d\d)?)"?(?=\s*[,;|\t])'
 )
-_PARQUETS: Final = (".parquet", ".pq")
 _KNOWN: Final = {
     b"\x1f\x8b": "must be unpacked, it is compressed",
     b"\x89HDF": "must be CSV or Parquet, it is an HDF5 file",
@@ -78,7 +79,6 @@ class Table:
     values: Floats  # shape (rows, columns); NaN for missing numbers
     rows: Indices  # lines of the file, from 1 (of a Parquet file: rows of the table)
     findings: tuple[Finding, ...] = ()
-    headed: bool = True
     # Index of each row among the lines that are not empty; unreadable lines leave gaps.
     order: Indices = dataclasses.field(default_factory=lambda: np.empty(0, np.intp))
 
@@ -97,58 +97,43 @@ def read_table(path: Path, reader: Reader) -> tuple[Table, str]:
     for mark, what in _KNOWN.items():
         if data.startswith(mark):
             raise InputError(f"{where}: {what}")
-    kind = next(read for is_of, read in READERS if is_of(data, path))
-    return kind(data, reader, where), digest
+    if data[:4] == b"PAR1" or path.suffix.lower() in {".parquet", ".pq"}:
+        return _parquet(data, where), digest
+    if data[:4] == WORKBOOK:
+        text, columns, findings = sheet_text(data, where, MOST_BYTES)
+        refuse_large(where, columns=columns)
+        reader = dataclasses.replace(reader, delimiter="\t", decimal=reader.decimal or ".")
+    else:
+        text, findings = decoded(data, where)
+    return parsed(text, reader, where, findings), digest
 
 
-def _workbook(data: bytes, reader: Reader, where: str) -> Table:
-    """Return the table of a workbook."""
-    text, columns, chosen = sheet_text(data, where, MOST_BYTES)
-    refuse_large(where, columns=columns)
-    reader = dataclasses.replace(reader, delimiter="\t", decimal=reader.decimal or ".")
-    return parsed(text, reader, where, chosen)
-
-
-def _text(data: bytes, reader: Reader, where: str) -> Table:
-    """Return the table of a text."""
-    text, findings = decoded(data, where)
-    return parsed(text, reader, where, findings)
-
-
-def _parquet(data: bytes, reader: Reader, where: str) -> Table:  # noqa: ARG001
-    """Return the table of a Parquet file."""
-    try:
-        return table_of(_frame(data, where), where)
-    except InputError:
-        raise
-    except Exception as error:  # noqa: BLE001 (whatever a damaged file makes of the reader)
-        raise InputError(f"{where}: is no Parquet file that can be read: {error}") from None
-
-
-def _frame(data: bytes, where: str) -> pd.DataFrame:
-    """Return a Parquet file's columns, if its declared size is allowed."""
+def _parquet(data: bytes, where: str) -> Table:
+    """Return the table of a Parquet file, if its declared size is allowed."""
     try:
         import pyarrow as pa
         from pyarrow import parquet
+
+        # An error of a damaged file in a second thread would crash the process.
+        file = parquet.ParquetFile(io.BytesIO(data), pre_buffer=False)
+        # Sizes are read from the row groups: reading a damaged column's may crash the process.
+        groups = [file.metadata.row_group(k) for k in range(file.metadata.num_row_groups)]
+        size = sum(max(8 * g.num_rows * g.num_columns, g.total_byte_size) for g in groups)
+        refuse_large(where, columns=file.metadata.num_columns, size=size)
+        # Texts and nested columns are unbounded.
+        kind = pa.types
+        is_number = (kind.is_integer, kind.is_floating, kind.is_boolean, kind.is_temporal)
+        names = [f.name for f in file.schema_arrow if any(is_of(f.type) for is_of in is_number)]
+        return table_of(file.read(columns=names, use_threads=False).to_pandas(), where)
+    except InputError:
+        raise
     except ModuleNotFoundError:
         raise InputError(
             f"{where}: a Parquet file needs the extra pendmap[viewer] (pyarrow), or must be saved"
             " as CSV"
         ) from None
-    file = parquet.ParquetFile(io.BytesIO(data))
-    # Sizes are read from the row groups: reading a damaged column's may crash the process.
-    groups = [file.metadata.row_group(k) for k in range(file.metadata.num_row_groups)]
-    size = sum(max(8 * g.num_rows * g.num_columns, g.total_byte_size) for g in groups)
-    refuse_large(where, columns=file.metadata.num_columns, size=size)
-    # Dictionary encoding stores each distinct text once.
-    kinds = (pa.types.is_string, pa.types.is_large_string, pa.types.is_binary)
-    fields = list(file.schema_arrow)
-    texts = [field.name for field in fields if any(kind(field.type) for kind in kinds)]
-    # Nested columns are unbounded and no numbers. An error of a damaged file in a second thread
-    # would crash the process, too.
-    flat = [field.name for field in fields if not pa.types.is_nested(field.type)]
-    whole = parquet.ParquetFile(io.BytesIO(data), read_dictionary=texts, pre_buffer=False)
-    return whole.read(columns=flat, use_threads=False).to_pandas()
+    except Exception as error:  # noqa: BLE001 (whatever a damaged file makes of the reader)
+        raise InputError(f"{where}: is no Parquet file that can be read: {error}") from None
 
 
 def is_frame(records: object) -> bool:
@@ -174,15 +159,13 @@ def table_of(frame: pd.DataFrame, where: str) -> Table:
     for k in range(frame.shape[1]):
         column = frame.iloc[:, k]
         if pd.api.types.is_datetime64_any_dtype(column):
-            column = (column - column.iloc[0]).dt.total_seconds()
-        elif pd.api.types.is_timedelta64_dtype(column):
+            column = column - column.iloc[0]
+        if pd.api.types.is_timedelta64_dtype(column):
             column = column.dt.total_seconds()
         elif isinstance(column.dtype, pd.CategoricalDtype):
-            known = pd.to_numeric(pd.Series(column.cat.categories), errors="coerce")
-            column = pd.Series(np.append(known.to_numpy(dtype=float), np.nan)[column.cat.codes])
-        else:
-            column = pd.to_numeric(column, errors="coerce")
-        columns.append(column.to_numpy(dtype=float, na_value=np.nan))
+            column = column.astype(object)
+        numbers = pd.to_numeric(column, errors="coerce")
+        columns.append(numbers.to_numpy(dtype=float, na_value=np.nan))
     values = np.column_stack(columns)
     order = np.arange(values.shape[0])
     return Table(tuple(map(str, frame.columns)), values, order + 1, order=order)
@@ -193,13 +176,12 @@ def decoded(data: bytes, where: str) -> tuple[str, list[Finding]]:
     findings: list[Finding] = []
     if not data.strip(b"\0 \t\r\n\xef\xbb\xbf"):
         raise InputError(f"{where}: must be a file with rows of numbers, it is empty")
+    nuls = data.count(b"\0")
+    many = nuls > MOST_NULS * len(data)
     if data[:2] in {b"\xff\xfe", b"\xfe\xff"}:
         return data.decode("utf-16", errors="replace"), findings
-    nuls = data.count(b"\0")
-    if nuls > MOST_NULS * len(data) and data[1::2].count(b"\0") > 0.9 * nuls:
+    if many and data[1::2].count(b"\0") > 0.9 * nuls:
         return data.decode("utf-16-le", errors="replace"), findings
-    if nuls > MOST_NULS * len(data):
-        raise InputError(f"{where}: must be CSV (or other text) or Parquet, it is no text")
     if nuls:
         data = data.replace(b"\0", b"")
         findings.append(finding_of("nul-bytes", number=counted(nuls, "NUL byte")))
@@ -207,7 +189,7 @@ def decoded(data: bytes, where: str) -> tuple[str, list[Finding]]:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
         text = data.decode("latin-1")
-    if len(_CONTROLS.findall(text)) > MOST_CONTROLS * len(text):
+    if many or len(_CONTROLS.findall(text)) > MOST_CONTROLS * len(text):
         raise InputError(f"{where}: must be CSV (or other text) or Parquet, it is no text")
     return text, findings
 
@@ -227,11 +209,6 @@ def parsed(text: str, reader: Reader, where: str, findings: list[Finding]) -> Ta
     lines = [(k, line) for k, line in every if line.strip() and k > reader.skip_rows]
     if not lines:
         raise InputError(f"{where}: must be a file with rows of numbers, it is empty")
-    if sum(len(line) > LONGEST_LINE for _, line in lines) > LEAST_ROWS * len(lines):
-        raise InputError(
-            f"{where}: must be a table of up to {MOST_COLUMNS} columns, got lines of more than "
-            f"{LONGEST_LINE} characters"
-        )
     # Lines that are too long are unreadable.
     lines = [(k, line if len(line) <= LONGEST_LINE else "?") for k, line in lines]
     lines, dated = without_dates(lines)
@@ -243,28 +220,23 @@ def parsed(text: str, reader: Reader, where: str, findings: list[Finding]) -> Ta
         cells += row or ()
     columns = [cells[k::width] for k in range(width)]
     first = fits.index(True)
-    half = fits[-1] and not text.endswith(("\n", "\r")) and _cut(columns[-1][-21:])
-    if half:
-        fits[-1] = False
-        columns = [column[:-1] for column in columns]
-        findings.append(finding_of("half-line"))
-    names, headed = _header([line for _, line in lines[:first]], delimiter, width)
-    if headed and len(names) != width:
+    names = _header([line for _, line in lines[:first]], delimiter, width)
+    if len(names) != width:
         raise InputError(
             f"{where}: as many columns must have names as numbers, got {len(names)} with names and"
             f" {width} with numbers; decimal commas need another delimiter, like ;"
         )
     dropped = [k for (k, _), fit in zip(lines[first:], fits[first:], strict=True) if not fit]
-    if dropped and not (half and len(dropped) == 1):
+    if dropped:
         shown = listed([str(k) for k in dropped], 3)
         number, where = counted(len(dropped), "line"), f"line {shown}"
         findings.append(finding_of("unreadable-lines", where=where, lines=number, width=width))
-    if dated and headed and TIME not in names:
+    if dated and any(names) and TIME not in names:
         names = (TIME, *names[1:])
     order = np.flatnonzero(fits)
     numbers = [_numbers(column, decimal) for column in columns]
     places = np.array([lines[k][0] for k in order])
-    return Table(names, np.column_stack(numbers), places, tuple(findings), headed, order - first)
+    return Table(names, np.column_stack(numbers), places, tuple(findings), order - first)
 
 
 def _numbers(column: list[str], decimal: str) -> Floats:
@@ -358,21 +330,15 @@ def _row(line: str, delimiter: str, decimal: str, width: int) -> list[str] | Non
     return parts if len(parts) == width and _is_row(parts, decimal) else None
 
 
-def _cut(cells: list[str]) -> bool:
-    """Return whether the last cell is truncated: fewer decimals than all before it."""
-    *before, last = (len(cell.replace(",", ".").partition(".")[2]) for cell in cells)
-    return len(set(before)) == 1 and last < before[0]
-
-
-def _header(lines: list[str], delimiter: str, width: int) -> tuple[tuple[str, ...], bool]:
-    """Return the column names, with units from a separate line, and whether there are any."""
+def _header(lines: list[str], delimiter: str, width: int) -> tuple[str, ...]:
+    """Return the column names, with units from a separate line; empty ones without a header."""
     heads = [_split(line.lstrip("#% "), delimiter) for line in lines[-3:]]
     heads = [[part.strip('"') for part in head] for head in heads if len(head) > 1 or width == 1]
     if heads and delimiter == "," and len(heads[-1]) != width and len(heads[-1]) * 2 == width:
-        return tuple(heads[-1]), True  # decimal commas between commas: refused by the caller
+        return tuple(heads[-1])  # decimal commas between commas: refused by the caller
     heads = [head for head in heads if len(head) == width and any(head)]
     if not heads:
-        return ("",) * width, False
+        return ("",) * width
     names = heads[-1]
     if len(heads) > 1 and all(re.fullmatch(r"[\(\[]?[^\d\s]{0,6}\d?[\)\]]?", n) for n in names):
         units = [name.strip("()[] ") for name in names]
@@ -380,7 +346,7 @@ def _header(lines: list[str], delimiter: str, width: int) -> tuple[tuple[str, ..
         known = any(unit and c.has(unit) for unit in units for c in CHANNELS.values())
         if known and any(above):
             names = [f"{a} [{u}]" if u else a for a, u in zip(above, units, strict=True)]
-    return tuple(names), True
+    return tuple(names)
 
 
 def without_dates(lines: list[tuple[int, str]]) -> tuple[list[tuple[int, str]], bool]:
@@ -401,11 +367,3 @@ def without_dates(lines: list[tuple[int, str]]) -> tuple[list[tuple[int, str]], 
             return lines, False
         seconds.append((number, since.replace(".", date[2] or ".") + line[date.end() :]))
     return seconds, True
-
-
-# Kinds of files: whether a file is of a kind, and what reads it
-READERS: Final[Sequence[tuple[Callable[[bytes, Path], bool], Callable[..., Table]]]] = (
-    (lambda data, _: data[:4] == WORKBOOK, _workbook),
-    (lambda data, path: data[:4] == b"PAR1" or path.suffix.lower() in _PARQUETS, _parquet),
-    (lambda _, __: True, _text),
-)

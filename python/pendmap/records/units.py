@@ -36,17 +36,12 @@ class Channel:
     def factor(self, unit: str, where: str) -> float:
         """Return the factor from a unit to SI; raise InputError for other units."""
         spelled = spelling(unit)
-        if spelled in self.units:
-            return self.units[spelled]
-        if spelled in _RAW:
+        if spelled not in self.units:
             raise InputError(
-                f"{where}: unit {unit!r} must have a scale beside it, {self.unit} per {unit},"
-                " in [columns] of experiment.toml"
+                f"{where}: unit must be one of {', '.join(self.units)}, or have a scale beside it,"
+                f" {self.unit} per unit, in [columns] of experiment.toml, got {unit!r}"
             )
-        raise InputError(
-            f"{where}: unit must be one of {', '.join(self.units)}, or have a scale,"
-            f" {self.unit} per unit, got {unit!r}"
-        )
+        return self.units[spelled]
 
     def has(self, unit: str) -> bool:
         """Return whether a text is one of the channel's units, raw ones included."""

@@ -16,8 +16,7 @@ if TYPE_CHECKING:
 WORKBOOK: Final = b"PK\x03\x04"  # First bytes of a workbook
 MOST_CELLS: Final = 5_000_000  # Most cells of a sheet; a row has one more
 _MOST_ROWS: Final = 2**20  # Rows that Excel has
-_EPOCH: Final = dt.datetime(1970, 1, 1)  # noqa: DTZ001 (workbooks have no time zone)
-_ERRORS: Final = ("#DIV/0!", "#N/A", "#NAME?", "#NULL!", "#NUM!", "#REF!", "#VALUE!")
+_DATES: Final = (dt.datetime, dt.time, dt.timedelta)
 
 
 def sheet_text(data: bytes, where: str, most: int) -> tuple[str, int, list[Finding]]:
@@ -43,7 +42,11 @@ def sheet_text(data: bytes, where: str, most: int) -> tuple[str, int, list[Findi
         ) from None
     except Exception as error:  # noqa: BLE001 (whatever a damaged file makes of the reader)
         raise InputError(f"{where}: is no Excel file that can be read: {error}") from None
-    numbers = {name: sum(sum(map(_is_number, row)) for row in sheets[name]) for name in sheets}
+    kinds = (int, float, *_DATES)
+    numbers = {
+        name: sum(isinstance(cell, kinds) for row in rows for cell in row)
+        for name, rows in sheets.items()
+    }
     if not any(numbers.values()):
         raise InputError(f"{where}: a sheet must have rows of numbers, got none")
     name = max(numbers, key=numbers.__getitem__)
@@ -60,7 +63,7 @@ def _rows(sheet: Any, where: str) -> list[list[object]]:  # noqa: ANN401 (a shee
     sheet.reset_dimensions()  # loggers write wrong ones
     rows, count = list[list[object]](), 0
     for row in sheet.iter_rows(max_row=_MOST_ROWS, values_only=True):
-        cells = [None if cell in _ERRORS else cell for cell in row]
+        cells = list(row)
         while cells and cells[-1] is None:
             cells.pop()
         rows.append(cells)
@@ -72,23 +75,10 @@ def _rows(sheet: Any, where: str) -> list[list[object]]:  # noqa: ANN401 (a shee
     return rows
 
 
-def _is_number(cell: object) -> bool:
-    """Return whether a cell has a number, a date or a time."""
-    kinds = (int, float, dt.datetime, dt.time, dt.timedelta)
-    return isinstance(cell, kinds) and not isinstance(cell, bool) and cell == cell  # noqa: PLR0124
-
-
 def _text(cell: object) -> str:
-    """Return a cell as text: numbers in full, times in s."""
-    if cell is None or cell != cell:  # noqa: PLR0124 (what is no number or no date)
-        return ""
-    if isinstance(cell, dt.datetime):
-        # timestamp() would apply daylight saving time, which the record does not contain.
-        return repr((cell - _EPOCH).total_seconds())
-    if isinstance(cell, dt.time):
-        return repr(3600 * cell.hour + 60 * cell.minute + cell.second + 1e-6 * cell.microsecond)
-    if isinstance(cell, dt.timedelta):
-        return repr(cell.total_seconds())
-    if isinstance(cell, (int, float)) and not isinstance(cell, bool):
-        return repr(float(cell))
-    return " ".join(str(cell).split())
+    """Return a cell as text: dates and times in s."""
+    from openpyxl.utils.datetime import to_excel
+
+    if isinstance(cell, _DATES):
+        return repr(round(86400 * to_excel(cell), 6))
+    return "" if cell is None else " ".join(str(cell).split())

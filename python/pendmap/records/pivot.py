@@ -1,4 +1,4 @@
-"""Rules of other channels: velocity, acceleration and pivot against the angle.
+"""Rules of the pivot.
 
 A step ``s`` of a pivot's position sampled every ``h`` seconds is one of ``s / h^2`` in its
 acceleration (1000 m/s^2 for 1 mm at 1 kHz): stepwise positions are smoothed by cubics.
@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.formatting import counted
 from pendmap.records.resolution import step_of
 from pendmap.signal.local_polynomial import local_fit
 from pendmap.signal.robust import even_times
@@ -21,46 +20,12 @@ if TYPE_CHECKING:
     from pendmap.records.work import Work
     from pendmap.signal import Floats
 
-
-SAME_MOTION: Final = 0.8  # Least correlation of two channels of the same motion
-GAIN_OFF: Final = 0.1  # Greatest relative error of a gain that a channel's filter may cause
 FARTHEST_PIVOT: Final = {"m": 3.0, "m/s": 60.0, "m/s2": 3000.0}  # Greatest plausible span by unit
 PIVOT_ORDER: Final = {"m": 2, "m/s": 1}  # Order of differentiation to an acceleration, by unit
 NOISE_SHARE: Final = 0.05  # Greatest noise of the pivot's acceleration, over its largest value
 STEPS_PASSED: Final = 4.0  # Fewest resolution steps that a moving pivot passes within a window
 LONGEST_WINDOW: Final = 0.2  # Longest window of more than five readings, s
 MOVING_SHARE: Final = 0.2  # Speed, over the largest, above which the pivot is moving
-
-
-def velocity(work: Work) -> Finding | None:
-    """Compare a velocity with the angle's derivative: invert, rescale or remove it."""
-    if work.integrated or "velocity" not in work.extra:
-        return None  # nothing to compare it with
-    values = work.extra["velocity"]
-    if missing := int(np.count_nonzero(~np.isfinite(values))):
-        del work.extra["velocity"]
-        return work.finding("velocity-missing", number=counted(missing, "sample"))
-    fit = local_fit(work.time, work.theta)
-    which = work.trusted[fit.middle]
-    slope, seen = fit.slope[which], values[fit.middle][which]
-    scale = float(np.max(np.abs(seen), initial=0.0))
-    if slope.size < 10 or 0 in (scale, float(np.std(slope)), float(np.std(seen))):
-        return None
-    seen = seen / scale  # squares of huge numbers overflow
-    alike = float(np.corrcoef(slope, seen)[0, 1])
-    if abs(alike) < SAME_MOTION:
-        del work.extra["velocity"]
-        return work.finding("velocity-unlike", alike=alike)
-    gain = abs(float(np.dot(slope, seen) / np.dot(slope, slope)) * scale)
-    if abs(gain * math.pi / 180 - 1) < GAIN_OFF and "velocity" not in work.declared:
-        work.extra["velocity"] = values * math.pi / 180
-        work.note("velocity-unit", gain=gain)
-    elif abs(gain - 1) > GAIN_OFF:
-        work.note("velocity-scale", gain=gain)
-    if alike > 0:
-        return None
-    work.extra["velocity"] = -work.extra["velocity"]
-    return work.finding("sign-turned.velocity")
 
 
 def pivot_unit(work: Work) -> Finding | None:
@@ -70,13 +35,6 @@ def pivot_unit(work: Work) -> Finding | None:
         if work.pivot_unit and span > FARTHEST_PIVOT[work.pivot_unit]:
             return work.finding("pivot-unit.wrong", way=way, extent=span, unit=work.pivot_unit)
     return None
-
-
-def acceleration(work: Work) -> Finding | None:
-    """Report an acceleration that is not used, since there is an angle."""
-    if work.angle_source is not None or "acceleration" not in work.extra:
-        return None
-    return work.finding("acceleration-unused")
 
 
 def pivot_steps(work: Work) -> Finding | None:
