@@ -15,12 +15,13 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats
 
 
-def motion(
+def motion(  # noqa: PLR0913 (a start, and what moves it)
     x: Pendulum,
     theta: Any,  # noqa: ANN401 (numbers or arrays)
     velocity: Any,  # noqa: ANN401
     times: Sequence[float],
     further: Callable[..., Any] | None = None,
+    *,
     tol: float = 1e-11,
 ) -> Floats:
     """Return angles and velocities, shape (2, starts, times), under a further torque if any."""

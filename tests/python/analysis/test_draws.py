@@ -17,6 +17,7 @@ from pendmap import Axis, Effect, Grid, InputError, Pendulum, Rig, RunOptions
 from pendmap._core import Attractor
 from pendmap.analysis.draws import Draws, basins_over, drawn
 from pendmap.analysis.orbit_table import described
+from pendmap.identification.experiment import identified_model
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -260,6 +261,7 @@ def test_identify_writes_the_residual_of_its_model_and_the_noise() -> None:
     time = np.arange(0, 40, 0.01)
     theta = motion(Pendulum(gamma=0.2 / 6.2, p=0.0), 2.0, 0.0, 6.2 * time)[0, 0]
     noise = np.random.default_rng(SEED).normal(0, 1e-3, time.size)
-    model = pendmap.identify(time, theta + noise, methods=["trajectory"]).model
-    assert model.notes["provenance"]["rms"] == pytest.approx(1e-3, rel=0.05)
-    assert model.notes["provenance"]["noise"] == pytest.approx(1e-3, rel=0.1)
+    report = pendmap.identify(time, theta + noise, methods=["trajectory"])
+    known = identified_model(report).notes["provenance"]
+    assert known["rms"] == pytest.approx(1e-3, rel=0.05)
+    assert known["noise"] == pytest.approx(1e-3, rel=0.1)

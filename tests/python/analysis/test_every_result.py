@@ -41,7 +41,7 @@ SMALL: dict[str, Callable[..., xr.Dataset]] = {
     ),
     "sweep": lambda model, **more: pendmap.sweep(model, {"p": [0.5, 0.6]}, grid=6, **more),
     "parameter_map": lambda model, **more: pendmap.parameter_map(
-        model, {"p": [0.5, 0.6], "gamma": [0.1, 0.2]}, starts=3, **more
+        model, {"p": [0.5, 0.6], "omega": [1.9, 2.0]}, starts=3, **more
     ),
     "bifurcation": lambda model, **more: pendmap.bifurcation(
         model, {"p": [0.5, 0.6]}, starts=2, **more

@@ -187,7 +187,7 @@ def test_json_lists_the_frequencies_that_were_asked_for(finer: xr.Dataset) -> No
     coarse = pendmap.tongues(DAMPED, np.linspace(1.1, 2.1, 11), 3.0)
     one, other = (SCHEMA.json(result) for result in (coarse, finer))
     for key in ("curves", "inverted", "asymptotic"):
-        assert one[key] == other[key]
+        assert repr(one[key]) == repr(other[key])
 
 
 def test_undamped_rest_is_unstable_from_no_drive_on_where_omega_is_2() -> None:
@@ -200,7 +200,7 @@ def test_undamped_rest_is_unstable_from_no_drive_on_where_omega_is_2() -> None:
 
 @pytest.mark.parametrize(("low", "high"), [(0.70, 0.76), (1.0, 1.3)])
 def test_orbits_of_both_balances_under_a_torque_are_distinct(low: float, high: float) -> None:
-    omega = np.linspace(low, high, 13)
+    omega = np.linspace(low, high, 7)
     found = pendmap.tongues(Pendulum(gamma=0.1, torque=0.2), omega)
     for place in range(omega.size):
         hanging = found["p"].values[found["index"].values == place]
