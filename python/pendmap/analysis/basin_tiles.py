@@ -196,12 +196,13 @@ class BasinTiles:
                 periods += int(arrays["work"])
         whole = self._whole(plan, store, moves, check=labelled and check)
         attractors, last = plan.finish(np.ascontiguousarray(whole.counts[2:]))
+        cells = [self._merged(store, [*moves, last], tile) for tile in range(self.tiles)]
         return SimpleNamespace(
             **vars(whole),
             plan=plan,
             sources=(whole, *sources(plan, whole.texture, whole.checked, whole.counts, periods)),
             attractors=attractors,
-            cells=self._final(store, [*moves, last]),
+            cells={name: np.concatenate([one[name] for one in cells]) for name in cells[0]},
         )
 
     def _search(self, plan: _core.BasinPlan, store: Store, undecided: Indices, again: int) -> Cells:
@@ -221,10 +222,7 @@ class BasinTiles:
         return pack(moved=moved, state=np.frombuffer(plan.state, np.uint8))
 
     def _merged(self, store: Store, moves: list[Labels], tile: int) -> Cells:
-        """Return the cells of a tile with what the steps ``again`` have found.
-
-        Entry ``k`` of ``moves`` has the new number of each attractor after step ``k``.
-        """
+        """Return the cells of a tile; ``moves`` are the new numbers after each step ``again``."""
         arrays, shape = unpack(store.get(f"label/{tile}") or {}), (-1, *self.starts.shape[1:])
         names = [name for name in (*_CELLS, "finite_time_exponent") if name in arrays]
         cells: Cells = {name: arrays[name].reshape(shape).copy() for name in names}
@@ -290,8 +288,3 @@ class BasinTiles:
             checked=checked,
             near=near,
         )
-
-    def _final(self, store: Store, moves: list[Labels]) -> Cells:
-        """Return the cells of the map with the last numbers of the attractors."""
-        tiles = [self._merged(store, moves, tile) for tile in range(self.tiles)]
-        return {name: np.concatenate([cells[name] for cells in tiles]) for name in tiles[0]}

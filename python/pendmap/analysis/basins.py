@@ -42,11 +42,6 @@ RELIABLE: Final = 0.05
 """Share of labels changed by half the step or mirroring above which labels are not reliable."""
 
 
-def _attractors(dataset: xr.Dataset) -> list[dict[str, Any]]:
-    """Return the attractors for the JSON object."""
-    return orbit_table.objects(dataset, "attractor", "fraction", "stderr", "ci95")
-
-
 def _uncertainty(dataset: xr.Dataset) -> dict[str, Any] | None:
     """Return the uncertainty exponent of the boundary for the JSON object."""
     a, name = facts(dataset), "uncertainty_exponent"
@@ -59,14 +54,16 @@ def _uncertainty(dataset: xr.Dataset) -> dict[str, Any] | None:
         "ci95": [low, high],
         "dimension": 2 - value,
         "dimension_ci95": [2 - high, 2 - low],
-        "eps": [a["uncertainty_eps_low"], a["uncertainty_eps_high"]],
     }
 
 
 SCHEMA = Schema(
     "basins",
     result.UNITS,
-    Field("attractors", "", "attractors with their shares of the starts", read=_attractors),
+    Field(
+        *("attractors", "", "attractors with their shares of the starts"),
+        read=lambda d: orbit_table.objects(d, "attractor", "fraction", "stderr", "ci95"),
+    ),
     Found("undecided", "1", "share of the starts that no attractor captured within the bound"),
     Found("failed", "1", "share of the starts that failed or diverged"),
     Field("cells", "1", "starts"),
@@ -103,8 +100,6 @@ SCHEMA = Schema(
     Found("uncertainty_exponent_stderr", "1", "its standard error", None, json=False),
     Found("uncertainty_exponent_low", "1", "lower end of its 95 % interval", None, json=False),
     Found("uncertainty_exponent_high", "1", "upper end of its 95 % interval", None, json=False),
-    Found("uncertainty_eps_low", "1", "least distance, in sides of the window", None, json=False),
-    Found("uncertainty_eps_high", "1", "greatest distance that was fitted", None, json=False),
 )
 
 
@@ -375,6 +370,4 @@ def _boundary(dataset: xr.Dataset, texture: _core.Texture) -> dict[str, float]:
         name = "uncertainty_exponent"
         measures |= {name: law.value, f"{name}_stderr": law.stderr}
         measures[f"{name}_low"], measures[f"{name}_high"] = law.ci95
-        measures["uncertainty_eps_low"] = float(law.eps[0])
-        measures["uncertainty_eps_high"] = float(law.eps[law.scales - 1])
     return measures

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import TYPE_CHECKING, Any, Unpack
 
@@ -9,7 +10,8 @@ import numpy as np
 import xarray as xr
 
 from pendmap.analysis import cell_search, result, varied
-from pendmap.analysis.orbit_table import attractors_of, matched
+from pendmap.analysis.matching import matched, numbered
+from pendmap.analysis.orbit_table import attractors_of
 from pendmap.analysis.result import Field, Schema, point, rows
 from pendmap.analysis.run import Numerics, RunOptions
 from pendmap.errors import InputError, check_number, short_repr
@@ -219,27 +221,21 @@ def _hysteresis(dataset: xr.Dataset, values: Floats) -> list[str]:
 
 
 def _linked(raw: _core.Bifurcation, values: int) -> NDArray[np.int32]:
-    """Return the branch of each entry.
-
-    Orbits near one another and chaos of one kind are one branch, if they have equal turns.
-    """
-    bounds = np.searchsorted(raw.cell, np.arange(values + 1)).tolist()
+    """Return the branch of each entry: near orbits, and chaos of one kind, with equal turns."""
+    bounds = np.searchsorted(raw.cell, np.arange(values + 1))
     plane = np.stack([raw.point_theta, raw.point_velocity], axis=1)
     points = np.split(plane, np.searchsorted(raw.point_entry, np.arange(1, raw.cell.size)))
     kind = [raw.kinds[k].kind for k in raw.kind.tolist()]
     key = list(zip(kind, raw.n.tolist(), raw.w.tolist(), strict=True))
-    branch = np.full(raw.cell.size, -1, dtype=np.int32)
-    for value in range(values):
-        low, high = bounds[value : value + 2]
-        begin = bounds[max(value - 1, 0)]
+    links = []
+    for value, (begin, low, high) in enumerate(zip(bounds, bounds[1:], bounds[2:], strict=False)):
 
         def reach(a: int, b: int, begin: int = begin, low: int = low) -> float:
             if key[begin + a] != key[low + b]:
                 return 0.0
             return _NEAR if raw.n[low + b] else math.inf
 
-        for _, _, a, b in matched(points[begin:low], points[low:high], reach):
-            branch[low + b] = branch[begin + a]
-        new = np.flatnonzero(branch[low:high] < 0)
-        branch[low + new] = branch.max(initial=-1) + 1 + np.arange(new.size)
-    return branch
+        pairs = matched(points[begin:low], points[low:high], reach)
+        links += [((value, a), (value + 1, b)) for _, _, a, b in pairs]
+    branches = numbered(dict(enumerate(np.diff(bounds).tolist())), links)
+    return np.array([*itertools.chain(*branches.values())], dtype=np.int32)

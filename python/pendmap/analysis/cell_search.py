@@ -63,7 +63,6 @@ SEARCH: Final = (
     result.SECTION,
     *result.BOX,
     result.TOL.hidden,
-    Found("searched_again", "1", "cells searched again for attractors of a neighbour", json=False),
     result.SEED.hidden,
     *result.VERSIONS,
 )
@@ -158,9 +157,8 @@ def variables(
     one, rate = "entry", units.of_rate
     velocity = units.given(raw.velocity, VELOCITY)
     growth, error = (units.given(values, RATE) for values in (raw.exponent, raw.exponent_stderr))
-    lost, failed, watched = (
-        values.reshape(shape) for values in (raw.undecided, raw.failed, raw.chaos_periods)
-    )
+    of_cells = raw.undecided, raw.failed, raw.chaos_periods
+    lost, failed, watched = (values.reshape(shape) for values in of_cells)
     names = [kind.name for kind in raw.kinds]
     place, chaos = "cell of the whole result, row by row", "time for which chaos was not captured"
     kind = variable(one, raw.kind, "", "kind of attractor", flags=dict(enumerate(names)))

@@ -24,7 +24,8 @@ import numpy as np
 import xarray as xr
 
 from pendmap.analysis.fractality import BOX
-from pendmap.analysis.orbit_table import attractors_of, matched, points_of
+from pendmap.analysis.matching import matched
+from pendmap.analysis.orbit_table import attractors_of, points_of
 from pendmap.analysis.result import Field, indices, rows
 from pendmap.analysis.varied import with_values
 from pendmap.errors import MOST_DRAWS, InputError, check_whole, short_repr
@@ -108,11 +109,8 @@ def drawn_field(entries_of: Callable[[xr.Dataset], dict[str, Any]]) -> Field:
 def drawn(model: Pendulum | Rig, count: object, run: RunOptions) -> Draws:
     """Return models drawn from the Gaussian of a model's ``[covariance]``.
 
-    ``x = m + A z``, ``A A^T`` the covariance with the variance between runs, ``m`` the model's own
-    values, ``z`` standard normal. A draw is repeated if a damping or friction is below 0, the size
-    of a damping effect changes sign, or a value is outside a model's range: the Gaussian is
-    truncated there. The first draws do not depend on the number of draws. Raises InputError if the
-    model has no valid covariance, or hardly any draw is allowed.
+    It is cut off where damping or friction is below 0, the size of a damping effect changes sign,
+    or a value is outside a model's range. The first draws do not depend on the number of draws.
     """
     number = check_whole("draws", count, 2, MOST_DRAWS)
     known = covariance_of(model.notes)
@@ -157,14 +155,7 @@ def drawn(model: Pendulum | Rig, count: object, run: RunOptions) -> Draws:
 def outcomes(
     dims: tuple[Any, ...], cells: Iterable[tuple[NDArray[Any], Mapping[int, Any]]]
 ) -> tuple[list[Any], xr.Dataset]:
-    """Return the outcomes of cells over D draws, and their probabilities and shares.
-
-    ``cells`` are the numbers in the cells of each draw, and the outcome that each number stands
-    for. Variables are ``probability`` (outcome, M, N), ``drawn_share`` (outcome, D), ``exists``
-    (the share of the draws that have it), ``share_mean``, ``share_low``, ``share_high`` (the 95 %
-    interval over the draws); over the cells ``certainty``, the probability of the most likely
-    outcome; ``sure_cells``, the share of the cells with a certainty of 95 % or more.
-    """
+    """Return the outcomes of cells over draws, and their shares; cells have numbers of outcomes."""
     counts: dict[Any, NDArray[np.uint16]] = {}
     shares: list[dict[Any, float]] = []
     for numbers, of_number in cells:
@@ -210,13 +201,7 @@ def outcome_lines(dataset: xr.Dataset, names: Sequence[str], what: str, most: in
 
 
 def basins_over(dataset: xr.Dataset, draws: Draws, analysis: Analysis) -> xr.Dataset:
-    """Return a basin map of M x N cells with statistics of the maps of D draws.
-
-    Adds the variables of :func:`outcomes`, over ``outcome``, all outcomes of starts by name, and
-    over the cells; ``label_entropy`` over the cells, in nat; over boxes ``doubt_start`` and
-    ``doubt_parameters``, in nat, and their means ``doubt_start_mean`` and
-    ``doubt_parameters_mean``; ``drawn`` (D, parameter).
-    """
+    """Return a basin map with the outcomes of draws by name, and both sources of uncertainty."""
     labels = dataset["label"]
     boxes = _in_boxes(labels, labels.values > 0)
     shares_of: dict[str, Floats] = {}  # sums over the draws of the shares of the boxes

@@ -231,9 +231,8 @@ def _on_grid(cells: Labels, periodic: tuple[bool, bool]) -> tuple[Floats, Floats
 
 def fitted_map(dataset: xr.Dataset) -> UncertaintyExponent | None:
     """Return the uncertainty exponent of a map with counts; None if they are too few."""
-    eps, uncertain, tried = (
-        dataset[name].values for name in ("uncertainty_eps", "uncertain", "uncertainty_tried")
-    )
+    names = "uncertainty_eps", "uncertain", "uncertainty_tried"
+    eps, uncertain, tried = (dataset[name].values for name in names)
     return fitted(eps, uncertain, tried)
 
 

@@ -309,10 +309,8 @@ def _summary(dataset: xr.Dataset, basin_map: xr.Dataset, period: float) -> list[
                 f"THE TAIL FROM PERIOD {a['from_period']} IS NOT EXPONENTIAL (chance "
                 f"{a['tail_chance']:.1g}): its mean depends on where it begins."
             )
-        line = (
-            f"On the chaotic saddle: exponent {exponent}, {per_period}, entropy {a['entropy']:.4g}"
-        )
-        dimension = a["saddle_dimension"]
+        entropy, dimension = f"entropy {a['entropy']:.4g}", a["saddle_dimension"]
+        line = f"On the chaotic saddle: exponent {exponent}, {per_period}, {entropy}"
         lines.append(line + (f"; dimension {dimension:.3f}." if dimension > 0 else "."))
     elif not a["captured_starts"]:
         lines.append(
@@ -337,12 +335,7 @@ def _summary(dataset: xr.Dataset, basin_map: xr.Dataset, period: float) -> list[
 
 
 def lifetime_over(dataset: xr.Dataset, draws: Draws, analysis: Analysis) -> xr.Dataset:
-    """Return a lifetime with the lifetimes of D draws from the same starts, without dimensions.
-
-    Adds ``drawn_mean_periods`` (D), nan without transient chaos; ``mean_periods_low`` and
-    ``mean_periods_high``, the 95 % interval over the draws, which includes the counting error;
-    ``transient_share`` and ``persistent_share``; ``drawn`` (D, parameter).
-    """
+    """Return a lifetime with those of draws; their interval includes the counting error."""
     names = ("mean_periods", "transient_chaos", "persistent")
     rows = [[float(one[name]) for name in names] for one in draws.results(analysis)]
     mean, transient, persistent = np.array(rows).T
@@ -356,9 +349,7 @@ def lifetime_over(dataset: xr.Dataset, draws: Draws, analysis: Analysis) -> xr.D
         transient_share=variable((), transient.mean(), "1", f"{share} transient chaos"),
         persistent_share=variable((), persistent.mean(), "1", f"{share} persistent chaos"),
     )
-    line = (
-        f"{100 * transient.mean():.3g} % of the draws have transient chaos, 95 % of the mean "
-        f"lifetimes in [{low:.4g}, {high:.4g}] periods; in {100 * persistent.mean():.3g} % chaos "
-        "persists."
-    )
+    line = f"{100 * transient.mean():.3g} % of the draws have transient chaos, 95 % of the mean "
+    line += f"lifetimes in [{low:.4g}, {high:.4g}] periods; "
+    line += f"in {100 * persistent.mean():.3g} % chaos persists."
     return draws.complete(with_draws, [line])

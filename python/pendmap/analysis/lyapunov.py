@@ -33,10 +33,6 @@ _MOST_PRECISION = 0.5  # Largest relative standard error, at which the exponent'
 _BY_ROUNDING = math.log(1e10)  # Growth of deviations from which rounding determines the result
 
 
-def _attractor(dataset: xr.Dataset) -> dict[str, Any] | None:
-    return next(iter(orbit_table.objects(dataset, "attractor")), None)
-
-
 SCHEMA = Schema(
     "lyapunov",
     result.UNITS,
@@ -48,7 +44,10 @@ SCHEMA = Schema(
     Found("exponent_sum", result.OF_RATE, "sum of both exponents"),
     Found("kaplan_yorke_dimension", "1", "dimension of the stroboscopic map's attractor"),
     Found("end", "", "captured, chaotic, undamped, undecided or failed"),
-    Field("attractor", "", "the attractor that was reached", read=_attractor),
+    Field(
+        *("attractor", "", "the attractor that was reached"),
+        read=lambda d: next(iter(orbit_table.objects(d, "attractor")), None),
+    ),
     Found("transient_periods", "periods", "time of capture; -1: none", convert=none_below_0),
     Field("trajectories", "1", "trajectories of the ensemble"),
     Field("periods", "periods", "length of each of them"),

@@ -190,9 +190,8 @@ def _power(pendulum: Pendulum, orbit: Orbit, at: Floats) -> Floats:
 
 def _threshold(pendulum: Pendulum, omega: float, orbit: Orbit) -> float:
     """Return the ``p`` at which ``W + p D`` first has a zero for some phase; nan if unresolved."""
-    still, driven, twice = (
-        dataclasses.replace(pendulum, p=p, omega=omega) for p in (0.0, 1.0, 2.0)
-    )
+    amplitudes = 0.0, 1.0, 2.0
+    still, driven, twice = (dataclasses.replace(pendulum, p=p, omega=omega) for p in amplitudes)
     starts = driven.period * np.arange(_PHASES) / _PHASES
     passive = _power(still, orbit, np.zeros(1))
     power = _power(driven, orbit, starts) - passive

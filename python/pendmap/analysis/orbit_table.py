@@ -1,8 +1,7 @@
-"""Closed orbits and attractors: columns, JSON objects, identification between two models."""
+"""Closed orbits and attractors: columns and JSON objects."""
 
 from __future__ import annotations
 
-import itertools
 import math
 from typing import TYPE_CHECKING, Any, Final
 
@@ -14,7 +13,7 @@ from pendmap.files.variables import variable
 from pendmap.units import RATE, TIME, VELOCITY, Units
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Sequence
 
     import xarray as xr
     from numpy.typing import NDArray
@@ -29,7 +28,6 @@ DESCRIBED: Final = {
     "turn": ("1", "multiple of a turn around which it moves"),
 }
 """What tells attractors of one kind apart: unit, meaning, comment."""
-_APART = math.pi  # Distance assigned to an attractor without points, rad
 
 
 def table(orbits: Sequence[_core.Attractor], units: Units, one: str) -> dict[str, Any]:
@@ -115,46 +113,3 @@ def points_of(dataset: xr.Dataset, one: str) -> list[Floats]:
     points = np.stack([dataset["point_theta"].values, dataset["point_velocity"].values], axis=1)
     owner = dataset[f"point_{one}"].values
     return [points[owner == k] for k in dataset["id"].values]
-
-
-def matched(
-    old: Sequence[Floats],
-    new: Sequence[Floats],
-    reach: Callable[[int, int], float],
-    continued: Iterable[tuple[int, int]] = (),
-    *,
-    circle: bool = True,
-) -> list[tuple[bool, float, int, int]]:
-    """Match attractors of two models, given by their points: first what Newton's method continues.
-
-    Of the others the nearest pairs come first, those apart by less than ``reach`` of their numbers;
-    0 where they are not alike. Return whether no orbit leads there, distance, and both numbers.
-    """
-    pairs = [(False, _apart(old[k], new[m], circle=circle), k, m) for k, m in continued]
-    taken = {k for _, _, k, _ in pairs}, {m for *_, m in pairs}
-    both = itertools.product(range(len(old)), range(len(new)))
-    free = [(k, m) for k, m in both if k not in taken[0] and m not in taken[1] and reach(k, m)]
-    for far, k, m in sorted((_apart(old[k], new[m], circle=circle), k, m) for k, m in free):
-        if k not in taken[0] and m not in taken[1] and far < reach(k, m):
-            taken[0].add(k)
-            taken[1].add(m)
-            pairs.append((True, far, k, m))
-    return pairs
-
-
-def _apart(one: Floats, other: Floats, *, circle: bool) -> float:
-    """Return the larger of the mean distances from the points of one set to the other."""
-    return max(distance(one, other, circle=circle), distance(other, one, circle=circle))
-
-
-def distance(one: Floats, other: Floats, *, circle: bool = True) -> float:
-    """Return the mean distance from points of ``one`` to the nearest of ``other``.
-
-    On a ``circle`` angles are taken modulo turns.
-    """
-    if not (one.size and other.size):
-        return _APART
-    away = one[:, None] - other[None]
-    if circle:
-        away[..., 0] = np.remainder(away[..., 0] + math.pi, math.tau) - math.pi
-    return float(np.hypot(away[..., 0], away[..., 1]).min(axis=1).mean())

@@ -294,11 +294,7 @@ def _summary(dataset: xr.Dataset) -> list[str]:
 
 
 def regimes_over(dataset: xr.Dataset, draws: Draws, analysis: Analysis) -> xr.Dataset:
-    """Return a map of M x N cells with the regimes of D draws of the other parameters.
-
-    Adds ``outcome_has`` (as ``regime_has``), the variables of ``draws.outcomes`` over ``outcome``,
-    all regimes, and over the cells, and ``drawn`` (D, parameter).
-    """
+    """Return a map with the regimes of draws of the other parameters."""
     ranks: dict[str, tuple[int, ...]] = {}
 
     def cells() -> Iterator[tuple[NDArray[Any], dict[int, tuple[str, ...]]]]:

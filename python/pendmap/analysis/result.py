@@ -108,11 +108,7 @@ class Schema:
         raw: object = None,
         replaced: Collection[str] = (),
     ) -> None:
-        """Set the facts of a dataset: values given, else those of the core's result, or of several.
-
-        Those of a dataset that it was made of are removed. The parameters of the model become
-        coordinates without dimensions, except those ``replaced`` by others, which vary.
-        """
+        """Set the facts of a dataset, and as coordinates the parameters that are not replaced."""
         from pendmap.files.dataset import history_of  # noqa: PLC0415 (xarray takes a while)
 
         for name in [name for name in dataset.variables if not dataset[name].dims]:

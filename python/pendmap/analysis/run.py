@@ -135,14 +135,9 @@ class RunOptions:
         """Number of threads of this process."""
         return self.threads or _core.default_threads()
 
-    @property
-    def tiled(self) -> bool:
-        """Whether the result is computed in tiles."""
-        return self.store is not None or self.executor is not None
-
     def in_memory(self, what: str) -> RunOptions:
         """Return the options, refused where ``what`` needs the memory of this process."""
-        if self.tiled:
+        if self.store is not None or self.executor is not None:
             raise InputError(f"{what} must be given without a store or an executor, got both")
         return self
 

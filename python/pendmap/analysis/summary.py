@@ -17,9 +17,7 @@ if TYPE_CHECKING:
 
     from pendmap.model import Pendulum
 
-_NEARLY_CHANCE: Final = (
-    0.15  # Agreement of neighbours above chance, below which it is hardly better
-)
+_NEARLY_CHANCE: Final = 0.15  # Excess of agreement over chance below which it is hardly better
 _SPECIAL: Final = {
     "conservative": "Without damping (gamma = 0) phase area is kept and there are no attractors",
     "only_chaos": "Chaos captures all starts: labels carry no information",
@@ -93,11 +91,9 @@ def unlimited_rotation(pendulum: Pendulum) -> list[str]:
     brakes = pendulum.gamma or any(effect.brakes for effect in pendulum.effects)
     if brakes or not pendulum.theta_r or not sustained:
         return []
-    line = (
-        "Without viscous damping (gamma = 0) nothing limits a rotation that the torque or the drive"
-        " sustains: it approaches no attractor, and a smaller --max-periods gives the same result."
-    )
-    return [line]
+    line = "Without viscous damping (gamma = 0) nothing limits a rotation that the torque or the "
+    line += "drive sustains: it approaches no attractor, and a smaller --max-periods gives the same"
+    return [f"{line} result."]
 
 
 def window_said(theta: Sequence[float], velocity: Sequence[float], units: Units) -> str:

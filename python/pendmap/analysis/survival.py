@@ -129,10 +129,7 @@ def _steady(lives: Times, censored: int, left: int, rate: float) -> float:
 def growth_on_saddle(
     basin_map: xr.Dataset, fitted: Tail | None, pendulum: Pendulum, threads: int
 ) -> tuple[float, float]:
-    """Return the exponent per period of starts before their capture, and its standard error.
-
-    Long-lived trajectories sample the natural measure of the saddle.
-    """
+    """Return the exponent per period on the saddle, of long-lived starts, and its error."""
     if fitted is None:
         return math.nan, math.nan
     units = Units.of(facts(basin_map))

@@ -163,10 +163,8 @@ def _names(names: list[str], first: list[Place], axes: Sequence[Varied]) -> list
 
 def attractors(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the attractors for JSON, with the ranges in which each exists."""
-    dims, objects = (
-        varied_names(dataset),
-        result.records(dataset, id="id", name="attractor", twin="twin"),
-    )
+    dims = varied_names(dataset)
+    objects = result.records(dataset, id="id", name="attractor", twin="twin")
     for k, one in enumerate(objects):
         exists = dataset["exists"].values[..., k]
         places = zip(dims, np.nonzero(exists), strict=True)
@@ -187,17 +185,12 @@ def maps_of(dataset: xr.Dataset) -> list[dict[str, Any]]:
         at = zip(varied_names(dataset), place, strict=True)
         one: dict[str, Any] = {dim: float(dataset[dim].values[k]) for dim, k in at}
         one["plane"] = PLANES[int(dataset["plane"].values[place])]
-        one |= {name: _number(data[name][place].item()) for name in _EVERY}
+        one |= {name: data[name][place].item() for name in _EVERY}
         one["attractors"] = attractors = []
         for k in np.flatnonzero(dataset["exists"].values[place]).tolist():
             kind, n, w = (int(data[name][place][k]) for name in ("kind", "n", "w"))
             names = {"id": k + 1, "kind": KINDS[kind], "n": n or None, "w": w if n else None}
-            values = {name: _number(data[name][place][k].item()) for name in reals}
+            values = {name: data[name][place][k].item() for name in reals}
             attractors.append(names | values | {"ci95": data["ci95"][place][k].tolist()})
         maps.append(one)
     return maps
-
-
-def _number(value: float) -> float | None:
-    """Return a number for JSON, None for one that is not a number."""
-    return None if math.isnan(value) else value

@@ -9,8 +9,8 @@ Newton's method, in halved steps of the parameters along its tangent where a who
 orbits are one where that leads from each to the other without a change of symmetry. What Newton's
 method does not join, chaos and what an orbit becomes where its period doubles, is matched by the
 distances of sets, as Attractors.jl does (Datseris & Wagemakers 2022, Chaos 32, 023104); tumbling
-chaos and running states that no orbit locks are followed by their kind alone. Nothing depends on
-the order in which the models were mapped or on the direction of a parameter.
+chaos and running states that no orbit locks are followed by their kind alone.
+Nothing depends on the direction of a parameter.
 """
 
 from __future__ import annotations
@@ -23,12 +23,11 @@ import math
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
-from scipy.cluster.hierarchy import DisjointSet
 
 from pendmap import _core
 from pendmap.analysis.basin_tiles import sources
 from pendmap.analysis.fractality import uncertainty_exponent
-from pendmap.analysis.orbit_table import distance, matched
+from pendmap.analysis.matching import distance, matched, numbered
 from pendmap.analysis.result import of_core
 from pendmap.analysis.run import part
 from pendmap.analysis.varied import with_values
@@ -254,39 +253,19 @@ def _spread(points: Sequence[tuple[float, float]], n: int | None) -> Sequence[tu
 
 
 def branches(job: SweepTiles, maps: Mapping[Place, Mapped]) -> dict[Place, list[int]]:
-    """Return the numbers from 0 of the branches that the attractors of each model belong to.
-
-    They are counted in the order in which they appear along the parameters, the first one slowest.
-    """
+    """Return the branches of the attractors of each model, from 0, the first parameter slowest."""
     places = sorted(maps)
-    nodes = [(place, k) for place in places for k in range(len(maps[place].found))]
-    joined, places_of = DisjointSet(nodes), {node: {node[0]} for node in nodes}
-
-    def join(one: Node, other: Node) -> None:
-        """Join two sets, unless some model has attractors of both."""
-        first, second = places_of[joined[one]], places_of[joined[other]]
-        if first.isdisjoint(second):
-            joined.merge(one, other)
-            small, large = sorted((first, second), key=len)
-            large |= small
-            places_of[joined[one]] = large
-
-    links = []
-    for place in places:
-        for m, at in enumerate(place):
-            if at > 0:
-                links += _links(job, maps, (*place[:m], at - 1, *place[m + 1 :]), place)
-    for _, _, one, other in sorted(links):
-        join(one, other)
-    for before, after in itertools.pairwise(sorted(_rests(maps, places))):
-        if before[0] == after[0]:
-            join(before[1], after[1])
-    number: dict[Node, int] = {}
-    for node in nodes:
-        number.setdefault(joined[node], len(number))
-    return {
-        place: [number[joined[place, k]] for k in range(len(maps[place].found))] for place in places
-    }
+    near = [
+        link
+        for place in places
+        for m, at in enumerate(place)
+        if at > 0
+        for link in _links(job, maps, (*place[:m], at - 1, *place[m + 1 :]), place)
+    ]
+    links = [(one, other) for _, _, one, other in sorted(near)]
+    rests = itertools.pairwise(sorted(_rests(maps, places)))
+    links += [(one, other) for (name, one), (same, other) in rests if name == same]
+    return numbered({place: len(maps[place].found) for place in places}, links)
 
 
 def _rests(maps: Mapping[Place, Mapped], places: list[Place]) -> Iterator[tuple[str, Node]]:

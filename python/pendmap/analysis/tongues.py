@@ -309,10 +309,7 @@ def with_turns(
     solve: Callable[[Floats], list[tuple[Row, ...]]],
     p_max: float,
 ) -> tuple[Floats, list[tuple[Row, ...]]]:
-    """Return frequencies with those near which a curve ends added, and the rows of all rests.
-
-    An interval is halved if a curve turns back, or ends below ``p_max``, between its frequencies.
-    """
+    """Return frequencies, also where a curve turns back or ends between two, and their rows."""
     rows, least = list(rows), _NOSE * (omega[-1] - omega[0])
     while True:
         pairs = (zip(a, b, strict=True) for a, b in itertools.pairwise(rows))

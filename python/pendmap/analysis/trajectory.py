@@ -37,10 +37,6 @@ _MOST_SAMPLES = 2_000_000  # Samples in all above which there are fewer than 64 
 _STRONGEST = 1e6  # Acceleration of the pivot over gravity up to which a trajectory takes seconds
 
 
-def _tol_reached(dataset: xr.Dataset) -> bool:
-    return bool(dataset["reached_error"] <= dataset.attrs["tol"])
-
-
 SCHEMA = Schema(
     "trajectory",
     result.UNITS,
@@ -50,7 +46,10 @@ SCHEMA = Schema(
     Found("stuck", result.FLAG, "whether friction holds the pendulum at the end", convert=bool),
     Found("turns", "1", "full turns between start and end"),
     result.TOL,
-    Field("tol_reached", "", "whether the tolerance was reached", read=_tol_reached),
+    Field(
+        *("tol_reached", "", "whether the tolerance was reached"),
+        read=lambda d: bool(d["reached_error"] <= d.attrs["tol"]),
+    ),
     result.REACHED,
     Found("end_error", "1", "change of the end by a 16 times smaller error of each step"),
     Field("interrupted", "", "1 where Ctrl-C ended it", read=lambda d: "interrupted" in d.attrs),
@@ -275,10 +274,7 @@ def _dataset(
     clock: Floats,
     pendulum: Pendulum | Rig,
 ) -> xr.Dataset:
-    """Return the samples ``every``, at times ``clock``, the section at ``once``, and the events.
-
-    A trajectory with fewer events than another has nan and no kind in their place.
-    """
+    """Return the samples ``every``, at times ``clock``, the section at ``once``, and the events."""
     units = pendulum.units
     theta, speed = (np.stack([getattr(raw, n) for raw in raws]) for n in ("theta", "velocity"))
     speed = units.given(speed, VELOCITY)
@@ -293,10 +289,8 @@ def _dataset(
     energies = energy(theta[:, every], speed[:, every], pendulum.attributes)
     rate, crossings = units.of_velocity, units.given(raws[0].time[once], TIME)
     at, period, event = (("start", name) for name in ("time", "period", "event"))
-    moments, formula = (
-        units.given(event_time, TIME),
-        "(dtheta/dtau)^2 / 2 + 1 - cos(theta), over m g l",
-    )
+    moments = units.given(event_time, TIME)
+    formula = "(dtheta/dtau)^2 / 2 + 1 - cos(theta), over m g l"
     return xr.Dataset(
         {
             "theta": variable(at, theta[:, every], "rad", "angle, not wrapped"),
@@ -361,7 +355,6 @@ def _summary(dataset: xr.Dataset, units: Units) -> list[str]:
         f"A 16 times smaller error of each step changes the state by {a['reached_error']:.1e} "
         f"after 5 periods{at_end} ({a['steps_per_period']} steps a period)."
     )
-    rounding = float(np.spacing(np.abs(dataset["theta"].values).max()))
     if not a["reached_error"] <= a["tol"]:
         lines.append(f"THE TOLERANCE {a['tol']:g} WAS NOT REACHED: rounding forbids smaller steps.")
     rounding = float(np.spacing(np.abs(dataset["theta"].values).max()))

@@ -94,21 +94,15 @@ class Varied:
 def varied(
     model: Pendulum | Rig, ranges: Mapping[str, ArrayLike], count: int
 ) -> tuple[Varied, ...]:
-    """Return the ``count`` axes along which parameters vary; values that fall are turned round.
-
-    A tuple has the first value, the last and their number; a mapping has arrays of one length, one
-    axis of several parameters; anything else is an array of values.
-    """
+    """Return the ``count`` axes along which parameters vary; values that fall are turned round."""
     curves = _curves(ranges, count)
     if len(curves) != count:
         given = ", ".join(map(str, ranges)) if isinstance(ranges, Mapping) else short_repr(ranges)
-        second, more = (
-            (", 'omega': (0.5, 3.0, 100)", " --omega 0.5:3:100") if count > 1 else ("", "")
-        )
+        both = ", 'omega': (0.5, 3.0, 100)", " --omega 0.5:3:100"
+        second, more = both if count > 1 else ("", "")
         raise InputError(
             f"ranges must be a mapping like {{'p': (0.5, 2.0, 100){second}}}, or on the command "
-            f"line --p 0.5:2:100{more}; "
-            f"got {given or 'nothing'}"
+            f"line --p 0.5:2:100{more}; got {given or 'nothing'}"
         )
     axes = tuple(_axis(model, curve) for curve in curves)
     every = _every(axes)

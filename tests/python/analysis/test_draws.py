@@ -8,18 +8,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 import xarray as xr
-from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.stats import norm, truncnorm
 
 import pendmap
+from by_scipy import decays, motion
 from pendmap import Axis, Effect, Grid, InputError, Pendulum, Rig, RunOptions
 from pendmap._core import Attractor
 from pendmap.analysis.draws import Draws, basins_over, drawn
 from pendmap.analysis.orbit_table import described
+from pendmap.identification.experiment import identified_model
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from pathlib import Path
 
 SEED = 3
 
@@ -38,22 +40,15 @@ def test_draws_have_the_mean_and_covariance_of_the_file() -> None:
     assert np.cov(found.values.T) == pytest.approx(matrix[:2, :2], rel=0.1)
     assert [one.w0 for one in found.models] == found.values[:, 0].tolist()
     assert all(one.phi == 0 for one in found.models)
-
-
-def test_the_spread_between_runs_adds_to_the_variance() -> None:
+    # The spread between runs adds to the variance.
     notes = noted(["w0"], [[9e-6]], between_runs={"w0": 0.004})
     found = drawn(Rig(w0=6.2, notes=notes), 4000, RunOptions(seed=SEED))
     assert found.values.std() == pytest.approx(0.005, rel=0.05)
-
-
-def test_a_few_draws_are_the_first_of_many() -> None:
-    rig = Rig(w0=6.2, notes=noted(["w0"], [[1e-4]]))
-    few, many, other = (
-        drawn(rig, count, RunOptions(seed=seed)).values
-        for count, seed in ((5, SEED), (50, SEED), (5, SEED + 1))
-    )
-    assert np.array_equal(few, many[:5])
-    assert not np.array_equal(few, other)
+    # A few draws are the first of many.
+    few = drawn(Rig(w0=6.2, notes=notes), 5, RunOptions(seed=SEED))
+    assert np.array_equal(few.values, found.values[:5])
+    other = drawn(Rig(w0=6.2, notes=notes), 5, RunOptions(seed=SEED + 1))
+    assert not np.array_equal(few.values, other.values)
 
 
 @pytest.mark.parametrize("name", ["c_over_m", "Tr", "quadratic_drag.q"])
@@ -70,7 +65,7 @@ def test_damping_and_friction_are_drawn_from_a_gaussian_cut_off_at_0(name: str) 
 
 
 @pytest.mark.parametrize(
-    ("notes", "said"),
+    ("notes", "text"),
     [
         ({}, r"draws: the model must have a \[covariance\]"),
         (noted(["w0"], [[1.0, 0.0]]), "matrix must be 1 x 1 finite numbers"),
@@ -81,34 +76,27 @@ def test_damping_and_friction_are_drawn_from_a_gaussian_cut_off_at_0(name: str) 
         (noted(["w0"], [[1e20]]), "must leave room for allowed values"),
     ],
 )
-def test_invalid_covariances_are_refused(notes: dict[str, Any], said: str) -> None:
-    with pytest.raises(InputError, match=said):
+def test_invalid_covariances_are_refused(notes: dict[str, Any], text: str) -> None:
+    with pytest.raises(InputError, match=text):
         drawn(Rig(w0=1e-3, notes=notes), 200, RunOptions(seed=SEED))
 
 
-def test_typed_parameters_are_not_drawn(tmp_path: Any) -> None:  # noqa: ANN401
+def test_typed_parameters_are_not_drawn(tmp_path: Path) -> None:
     notes = noted(["w0", "c_over_m", "p", "Omega"], np.diag([1.0, 2.0, 3.0, 4.0]) * 1e-6)
     path = tmp_path / "model.toml"
     pendmap.save_model(Rig(w0=6.2, c_over_m=0.1, p=0.5, Omega=12.0, notes=notes), path)
-    typed = {"gamma": 0.1, "stroke_mm": 30.0}
-    assert drawn(pendmap.load_model(path, typed), 2, RunOptions(seed=SEED)).names == ("w0", "Omega")
-    assert drawn(pendmap.load_model(path), 2, RunOptions(seed=SEED)).names == (
-        "w0",
-        "c_over_m",
-        "p",
-        "Omega",
-    )
+    known = drawn(pendmap.load_model(path), 2, RunOptions())
+    assert known.names == ("w0", "c_over_m", "p", "Omega")
+    typed = pendmap.load_model(path, {"gamma": 0.1, "stroke_mm": 30.0})
+    assert drawn(typed, 2, RunOptions()).names == ("w0", "Omega")
 
 
-def boundary(gamma: float, torque: float, velocity: float) -> float:
+def boundary(model: Pendulum, velocity: float) -> float:
     """Return the angle at which starts with this velocity begin to rotate for ever, by scipy."""
 
     def turns(theta: float) -> float:
-        def equation(_: float, state: np.ndarray) -> list[float]:
-            return [state[1], torque - gamma * state[1] - math.sin(state[0])]
-
-        run = solve_ivp(equation, (0, 60), [theta, velocity], method="DOP853", rtol=1e-11)
-        return 1.0 if run.y[0, -1] - theta > 8 * math.pi else -1.0
+        end = motion(model, theta, velocity, [60.0])[0, 0, 0]
+        return 1.0 if end - theta > 8 * math.pi else -1.0
 
     return float(brentq(turns, 1.0, 2.7, xtol=1e-9))
 
@@ -116,7 +104,7 @@ def boundary(gamma: float, torque: float, velocity: float) -> float:
 def test_a_boundary_that_shifts_with_a_normal_parameter_has_a_normal_distribution() -> None:
     """A tilt by d shifts the plane of an undriven pendulum, and the boundary in it, by -d."""
     gamma, torque, velocity, sigma, count = 0.3, 0.6, 0.4, 0.04, 60
-    edge = boundary(gamma, torque, velocity)
+    edge = boundary(Pendulum(gamma=gamma, p=0.0, torque=torque), velocity)
     tilt = Effect("rig_tilt", {"d": 0.0})
     notes = noted(["rig_tilt.d"], [[sigma**2]])
     pendulum = Pendulum(gamma=gamma, p=0.0, torque=torque, effects=(tilt,), notes=notes)
@@ -207,7 +195,7 @@ def test_doubt_from_fractal_boundaries_and_from_parameters_is_separate() -> None
     assert fractal["sure_cells"].item() == 0
 
 
-def test_attractors_of_draws_are_matched_by_name_and_not_by_number() -> None:
+def test_attractors_of_draws_are_matched_by_name_and_those_of_one_name_by_position() -> None:
     left = np.where(np.arange(10) < 4, 1, 2)[None].repeat(10, axis=0)
     one = painted(left, ["rest", "rotation 1:+1"])
     other = painted(3 - left, ["rotation 1:+1", "oscillation 2:0"])
@@ -217,13 +205,9 @@ def test_attractors_of_draws_are_matched_by_name_and_not_by_number() -> None:
     assert found.share_mean.values == pytest.approx([0.2, 0.45, 0.1, 0.25])
     assert found.exists.values == pytest.approx([0.5, 0.75, 0.25, 0.25])
     assert found.probability.values.sum(axis=0) == pytest.approx(1)
-
-
-def test_two_attractors_of_one_name_are_distinguished_by_position() -> None:
-    label = np.where(np.arange(10) < 4, 1, 2)[None].repeat(10, axis=0)
     names = ["oscillation 2:0 at +0.1000", "oscillation 2:0 at +0.9000"]
-    own = painted(label, names)
-    moved = painted(3 - label, ["oscillation 2:0 at -0.2000", "oscillation 2:0 at +1.1000"])
+    own = painted(left, names)
+    moved = painted(3 - left, ["oscillation 2:0 at -0.2000", "oscillation 2:0 at +1.1000"])
     moved["point_theta"] = ("point", np.array([1.1, -0.2]))
     found = gathered([own, own, moved])
     assert [*found.outcome.values] == names
@@ -232,21 +216,7 @@ def test_two_attractors_of_one_name_are_distinguished_by_position() -> None:
 
 def damped(p: float, spread: float) -> Pendulum:
     """Return a driven pendulum whose damping has the given standard error."""
-    notes = {"covariance": {"names": ["gamma"], "matrix": [[spread**2]]}}
-    return Pendulum(gamma=0.1, p=p, omega=2.0, notes=notes)
-
-
-def growth(gamma: float, p: float, omega: float = 2.0) -> float:
-    """Return the largest modulus of the multipliers of hanging rest, by scipy."""
-
-    def equation(tau: float, x: np.ndarray) -> list[float]:
-        pull = 1 + p * math.cos(omega * tau)
-        return [x[1], -gamma * x[1] - pull * x[0], x[3], -gamma * x[3] - pull * x[2]]
-
-    run = solve_ivp(
-        equation, (0, math.tau / omega), [1, 0, 0, 1], method="DOP853", rtol=1e-12, atol=1e-12
-    )
-    return float(np.abs(np.linalg.eigvals(run.y[:, -1].reshape(2, 2))).max())
+    return Pendulum(gamma=0.1, p=p, omega=2.0, notes=noted(["gamma"], [[spread**2]]))
 
 
 def test_the_probability_of_a_regime_is_its_share_of_the_draws() -> None:
@@ -257,7 +227,7 @@ def test_the_probability_of_a_regime_is_its_share_of_the_draws() -> None:
     rests = result["outcome_has"].sel(outcome_kind="rest").values.astype(bool)
     probability = result.probability.values[rests].sum(axis=0)[0]
     gammas = result.drawn.values[:, 0]
-    exact = [np.mean([growth(g, p) < 1 for g in gammas]) for p in result.p.values]
+    exact = [np.mean([decays(Pendulum(g, p, 2.0)) for g in gammas]) for p in result.p.values]
     assert probability == pytest.approx(exact)
     assert 0 < min(exact[2:5]) < 1
     assert result.probability.values.sum(axis=0) == pytest.approx(1)
@@ -277,3 +247,21 @@ def test_a_lifetime_has_the_interval_of_its_draws() -> None:
     ends = [result[f"mean_periods_{end}"].item() for end in ("low", "high")]
     assert ends == pytest.approx(np.quantile(means, [0.025, 0.975]))
     assert result["transient_share"].item() == 1
+
+
+def test_a_record_counts_as_missed_from_one_and_a_half_times_the_noise() -> None:
+    for rms, misses in ((1.49e-3, None), (1.51e-3, pytest.approx(1.51))):
+        rig = Rig(w0=6.0, c_over_m=0.6, notes={"provenance": {"rms": rms, "noise": 1e-3}})
+        run = pendmap.simulate(rig, 1.0, 0.0, 1.0)
+        assert run.attrs.get("misses_record") == misses
+        assert ("misses its record" in run.attrs["summary"]) == (misses is not None)
+
+
+def test_identify_writes_the_residual_of_its_model_and_the_noise() -> None:
+    time = np.arange(0, 40, 0.01)
+    theta = motion(Pendulum(gamma=0.2 / 6.2, p=0.0), 2.0, 0.0, 6.2 * time)[0, 0]
+    noise = np.random.default_rng(SEED).normal(0, 1e-3, time.size)
+    report = pendmap.identify(time, theta + noise, methods=["trajectory"])
+    known = identified_model(report).notes["provenance"]
+    assert known["rms"] == pytest.approx(1e-3, rel=0.05)
+    assert known["noise"] == pytest.approx(1e-3, rel=0.1)

@@ -6,7 +6,8 @@ import dataclasses
 import importlib
 import inspect
 import json
-from typing import TYPE_CHECKING, Any
+import re
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     import xarray as xr
+
+    from pendmap.analysis.result import Schema
 
 DRAG = Effect("quadratic_drag", {"q": 0.02}, ci95={"q": (0.01, 0.03)}, probability=0.9)
 OWN = Formula("own_pull", "-k*sin(2*theta)", {"k": 2})
@@ -38,7 +41,7 @@ SMALL: dict[str, Callable[..., xr.Dataset]] = {
     ),
     "sweep": lambda model, **more: pendmap.sweep(model, {"p": [0.5, 0.6]}, grid=6, **more),
     "parameter_map": lambda model, **more: pendmap.parameter_map(
-        model, {"p": [0.5, 0.6], "gamma": [0.1, 0.2]}, starts=3, **more
+        model, {"p": [0.5, 0.6], "omega": [1.9, 2.0]}, starts=3, **more
     ),
     "bifurcation": lambda model, **more: pendmap.bifurcation(
         model, {"p": [0.5, 0.6]}, starts=2, **more
@@ -60,6 +63,13 @@ RUNS = [name for name in RESULTS if "run" in inspect.signature(getattr(pendmap, 
 OF_ALL = ("Conventions", "comment", "history", "source", "references")
 
 
+def schema_of(name: str) -> Schema:
+    """Return the schema of the results of a function."""
+    kind = next(kind for kind, (_, names, _) in pendmap.ANALYSES.items() if name in names)
+    schema: Schema = importlib.import_module(f"pendmap.analysis.{kind}").SCHEMA
+    return schema
+
+
 @MODELS
 @pytest.mark.usefixtures("strict_recordings")
 @pytest.mark.parametrize("name", RESULTS)
@@ -75,12 +85,13 @@ def test_every_result_is_kept_and_shown(name: str, model: Pendulum | Rig, tmp_pa
     if name != "basins_of":  # a list of starts has no picture
         assert render.draw(back, tmp_path / "a.svg").stat().st_size > 1000
         assert viewer.record(back, tmp_path / "a.rrd").stat().st_size > 1000
+        with pytest.raises(InputError, match="no layer 'nothing'"):
+            render.draw(back, tmp_path / "b.svg", layer="nothing")
 
 
 @pytest.mark.parametrize("name", RESULTS)
 def test_every_result_follows_its_schema(name: str) -> None:
-    kind = next(kind for kind, (_, names, _) in pendmap.ANALYSES.items() if name in names)
-    schema = importlib.import_module(f"pendmap.analysis.{kind}").SCHEMA
+    schema = schema_of(name)
     names = [field.name for field in schema.fields]
     assert len(set(names)) == len(names)
     assert all(field.meaning for field in schema.fields)
@@ -91,6 +102,20 @@ def test_every_result_follows_its_schema(name: str) -> None:
     assert list(fields) == [f.name for f in schema.fields if f.json and f.name in fields]
     assert not {f.name for f in schema.fields if not f.json} & set(fields)
     json.dumps(fields)
+
+
+def test_titles_have_units_and_leave_out_what_is_zero() -> None:
+    effects = (
+        Effect("stribeck_friction", {"a": 0.5, "vs": 2.0}),
+        Effect("power_law_drag", {"q": 0.01, "n": 1.5}),
+        Effect("encoder_offset", {"d": -0.01}),
+    )
+    rig = Rig(w0=2.0, effects=effects, lab_time_s=30)
+    for text in ("a = 0.5 rad/s^2, vs = 2 rad/s", "n = 1.5)", "(d = -0.01 rad)", "time = 30 s"):
+        assert text in rig.title
+    for text in ("stribeck_friction (a = 0.125, vs = 1)", "encoder_offset (d = -0.01 rad)"):
+        assert text in rig.pendulum.title  # over w0^2, over w0; an angle is unchanged
+    assert Rig(w0=6.2).title == "w0 = 6.2 rad/s, c/m = 0 1/s, p = 0"
 
 
 POWERS = {"rad/s": 1, "1/s": 1, "s": -1}
@@ -121,27 +146,48 @@ def test_no_result_depends_on_threads(name: str) -> None:
         )
 
 
+FITTED = dataclasses.replace(
+    SI,
+    effects=(),
+    notes={
+        "covariance": {"names": ["w0", "c_over_m"], "matrix": [[1e-4, 0.0], [0.0, 1e-3]]},
+        "provenance": {"rms": 0.0271, "noise": 0.001},
+    },
+)
+
+
+@pytest.mark.parametrize("name", RESULTS)
+def test_every_result_of_a_fitted_model_reports_its_misfit_and_its_draws(
+    name: str, tmp_path: Path
+) -> None:
+    takes = "draws" in inspect.signature(getattr(pendmap, name)).parameters
+    result = RESULTS[name](FITTED, **({"draws": 3} if takes else {}))
+    fields = schema_of(name).json(result)
+    assert result.attrs["misses_record"] == pytest.approx(27.1)
+    assert fields["misses_record"] == pytest.approx(27.1)
+    line = "This model misses its record by 27.1 times the noise."
+    assert result.attrs["summary"].count(line) == 1
+    if takes:
+        assert (fields["draws"]["count"], result.drawn.shape) == (3, (3, 2))
+        assert fields["draws"]["parameters"] == ["w0", "c_over_m"]
+        assert render.draw(result, tmp_path / "a.svg").stat().st_size > 1000
+        assert viewer.record(result, tmp_path / "a.rrd").stat().st_size > 1000
+        with pytest.raises(InputError, match=r"draws: the model must have a \[covariance\]"):
+            RESULTS[name](SI, draws=3)
+
+
+@pytest.mark.parametrize("name", [name for name in RUNS if name not in {"orbit", "tongues"}])
+def test_without_damping_there_are_no_attractors(name: str) -> None:
+    result = RESULTS[name](Pendulum(gamma=0.0))
+    assert re.search("[Ww]ithout damping.* there are no attractors", result.attrs["summary"])
+    assert result.sizes.get("attractor", result.sizes.get("entry", 0)) == 0
+
+
 REFUSED = {
     "tol": (1.0, "tol must be a number from 1e-13 to 1e-2, got 1"),
     "max_periods": (0, "max_periods must be a whole number from 1 to .*, got 0"),
     "run": ({"seed": 1}, "run must be a RunOptions, like"),
 }
-
-
-@pytest.mark.parametrize(
-    ("given", "text"),
-    [
-        ({"threads": 0}, "threads must be a whole number from 1 to 256, got 0"),
-        ({"threads": 1.5}, "threads must be a whole number from 1 to 256, got 1.5"),
-        ({"seed": -1}, "seed must be a whole number from 0 to .*, got -1"),
-        ({"progress": 3}, "progress must be a function of two numbers"),
-    ],
-)
-def test_options_of_runs_are_checked(given: dict[str, Any], text: str) -> None:
-    with pytest.raises(InputError, match=text):
-        RunOptions(**given)
-    with pytest.raises(InputError, match=text):
-        pendmap.basins(BARE, 4, **given)
 
 
 def test_options_of_a_run_may_be_given_by_name() -> None:

@@ -115,22 +115,6 @@ def test_critical_amplitudes_are_where_the_growth_vanishes(
     assert sides == [not above, above]
 
 
-def test_the_growth_at_a_kink_that_vanishes_is_that_of_smooth_damping() -> None:
-    smooth = pendmap.orbit(Pendulum(0.2, 0.5, 1.8), 1, 0, Grid.square(16))["multipliers"].values[0]
-    effects = (Effect("asymmetric_viscous", {"b": 1e-9}),)
-    kinked = pendmap.orbit(Pendulum(0.2, 0.5, 1.8, effects=effects), 1, 0, Grid.square(16))
-    assert kinked["multipliers"].values[0] == pytest.approx(smooth, abs=1e-8)
-
-
-def test_an_equilibrium_under_a_torque_has_the_growth_of_both_half_swings() -> None:
-    effects = (Effect("asymmetric_viscous", {"b": 0.07}),)
-    found = pendmap.basins(Pendulum(0.1, 0.0, 2.0, torque=0.5, effects=effects), Grid.square(8))
-    stiffness = np.sqrt(1 - 0.5**2)
-    times = [np.pi / np.sqrt(stiffness - c**2 / 4) for c in (0.17, 0.03)]
-    exact = -(0.17 * times[0] + 0.03 * times[1]) / 2 / sum(times)
-    assert of_rest(found) == pytest.approx(exact, abs=1e-6)
-
-
 @pytest.mark.parametrize(
     ("half", "term"),
     [

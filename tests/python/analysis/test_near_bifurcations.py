@@ -9,23 +9,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import pendmap
+from by_scipy import motion
 from pendmap import Grid, Pendulum
 
 GRID = Grid.square(14)
-
-
-def rotating(pendulum: Pendulum, theta: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-    """Return which starts rotate in the end, by scipy."""
-    n = theta.size
-
-    def slope(t: float, y: np.ndarray) -> np.ndarray:
-        pull = 1 + pendulum.p * math.cos(pendulum.omega * t)
-        acceleration = pendulum.torque - pendulum.gamma * y[n:] - pull * np.sin(y[:n])
-        return np.concatenate([y[n:], acceleration])
-
-    y = np.concatenate([theta, velocity])
-    run = solve_ivp(slope, (0, 700), y, method="DOP853", rtol=1e-7, atol=1e-7, t_eval=[500, 700])
-    return np.abs(run.y[:n, 1] - run.y[:n, 0]) > math.tau
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -36,11 +23,12 @@ def test_rest_near_its_saddle_node_keeps_its_starts(seed: int) -> None:
     pendulum = Pendulum(gamma=gamma, p=p, omega=draw.uniform(1.5, 2.5), torque=torque)
     found = pendmap.basins(pendulum, GRID, check=False)
     theta, velocity = np.meshgrid(found["theta"].values, found["velocity"].values)
-    truth = rotating(pendulum, theta.ravel(), velocity.ravel())
+    angles = motion(pendulum, theta, velocity, [500, 700], tol=1e-7)[0]
+    rotating = np.abs(angles[:, 1] - angles[:, 0]) > math.tau
     turns = found["id"].values[found["kind"].str.contains("rotation").values]
-    assert 0 < truth.sum() < truth.size
+    assert 0 < rotating.sum() < rotating.size
     assert found["undecided"].item() == 0
-    assert np.array_equal(np.isin(found["label"].values.ravel(), turns), truth)
+    assert np.array_equal(np.isin(found["label"].values.ravel(), turns), rotating)
 
 
 @pytest.mark.parametrize(("gamma", "torque"), [(1.1, 0.99995), (0.9, -0.96), (1.5, 1.0001)])
