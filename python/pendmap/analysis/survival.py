@@ -33,8 +33,7 @@ _AGREEING: Final = 3  # Number of successive beginnings that must pass the test
 _FOLLOWED: Final = 400  # Largest number of trajectories along which deviations are followed
 _LONGEST: Final = 400  # Largest number of periods of these trajectories
 _LEAST_FOLLOWED: Final = 20  # Smallest number of trajectories for an estimate of growth
-_SETTLING: Final = 4.0
-"""Logarithm of the factor by which a trajectory approaches an attractor until its capture."""
+_SETTLING: Final = 4.0  # ln of the factor by which a trajectory approaches until its capture
 _LEAST_SETTLING, _MOST_SETTLING = 10, 500  # Bounds of the settling time, periods
 _ALIGNED: Final = 5  # Periods in which a deviation aligns with the direction of growth
 

@@ -23,7 +23,7 @@ from pendmap.errors import FitDiverged, InputError, check_whole
 from pendmap.identification.experiment import provenance
 from pendmap.identification.fit import refuse_astray
 from pendmap.records import experiment_of
-from pendmap.records.summary import unit_wrong
+from pendmap.records.summary import UNIT_FINDINGS, doubt_keys
 from pendmap.residuals.by_run import parameters_by_run
 from pendmap.residuals.torque import Torque, outstanding_bins, residual_torque
 
@@ -115,7 +115,7 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
     with _refuse_divergence(experiment):
         last = search(state, core)
         begin = state.scored(state.begun)
-        if not unit_wrong(experiment, *data.runs):
+        if not doubt_keys(experiment, *data.runs) & UNIT_FINDINGS:
             refuse_astray(experiment.path, data.fitted, last.fit)
         fitted = state.data.fitted
         while True:

@@ -38,7 +38,7 @@ from pendmap.identification.turning import TooShortError
 from pendmap.model import Rig
 from pendmap.model.effects import definition
 from pendmap.records import experiment_of
-from pendmap.records.summary import unit_wrong
+from pendmap.records.summary import UNIT_FINDINGS, doubt_keys
 from pendmap.signal.robust import from_first
 
 if TYPE_CHECKING:
@@ -239,7 +239,8 @@ def _best(
         # Other methods can replace this one, but not for requested effects or starting values.
         return None, Identification(BEST, warnings=(str(error),), applicable=False, converged=False)
     certain = joint.fit.converged or len(runs) > 1
-    if certain and not unit_wrong(experiment, *runs):
+    # A wrong unit makes residuals meaningless.
+    if certain and not doubt_keys(experiment, *runs) & UNIT_FINDINGS:
         refuse_astray(experiment.path, joint.given, joint.fit)
     return joint, dataclasses.replace(identification_of(joint), method=BEST)
 

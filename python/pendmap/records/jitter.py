@@ -82,9 +82,8 @@ def speed_of(time: Floats, theta: Floats, fastest: float) -> Floats:
 
     slope = adapted(time, weights)
     speed = adapted(_calm(theta), weights) / slope
-    # A fit in the sample number gives the speed at the regular instant. The weight of a reading
-    # needs the speed at its stamp, or the fit is biased. The offset of a stamp is predicted from
-    # its neighbours without the stamp itself, and limited next to gaps.
+    # The fit in the sample number gives the speed at the regular instant, not at the stamp, whose
+    # offset is predicted from its neighbours and limited.
     off = np.clip(adapted(time, middle) / middle[reach] / slope, -1.0, 1.0)
     speed = np.abs(speed + off * np.gradient(speed))
     # Across a gap the time is no polynomial in the sample number: the speed is interpolated.

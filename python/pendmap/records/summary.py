@@ -143,11 +143,6 @@ def doubt_keys(experiment: Experiment, *runs: Run) -> set[str]:
     return keys - {"angle-scale"}  # an effect can cause it, too
 
 
-def unit_wrong(experiment: Experiment, *runs: Run) -> bool:
-    """Return whether a unit of these runs is wrong, which makes residuals meaningless."""
-    return bool(doubt_keys(experiment, *runs) & UNIT_FINDINGS)
-
-
 def finding_lines(experiment: Experiment, *runs: Run, changes: bool = False) -> Iterator[str]:
     """Yield a line for each finding that is not in :func:`doubts`, or for changes of data alone."""
     for where, finding in experiment.findings_of(runs):
