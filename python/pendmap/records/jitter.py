@@ -85,7 +85,7 @@ def speed_of(time: Floats, theta: Floats, fastest: float) -> Floats:
     # The fit in the sample number gives the speed at the regular instant, not at the stamp, whose
     # offset is predicted from its neighbours and limited.
     off = np.clip(adapted(time, middle) / middle[reach] / slope, -1.0, 1.0)
-    speed = np.abs(speed + off * np.gradient(speed))
+    speed = np.asarray(np.abs(speed + off * np.gradient(speed)))
     # Across a gap the time is no polynomial in the sample number: the speed is interpolated.
     steps = np.diff(np.pad(time, reach, mode="reflect", reflect_type="odd"))
     windows = np.lib.stride_tricks.sliding_window_view(steps, 2 * reach)
