@@ -39,8 +39,8 @@ settings.load_profile("steady")
 @pytest.fixture(scope="session", autouse=True)
 def known_diagnoses(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of `hidden.diagnosed`, shared by all processes of this test run."""
-    own = tmp_path_factory.getbasetemp()
-    folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "diagnoses"
+    base = tmp_path_factory.getbasetemp()
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "diagnoses"
     folder.mkdir(exist_ok=True)
     hidden.KNOWN[:] = [folder]
     return folder

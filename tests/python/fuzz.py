@@ -197,8 +197,8 @@ def model(rng: random.Random) -> Case:
     """Draw an invalid model file, or one with a formula of its own."""
     name = rng.choice(["simulate", "basins", "tongues", "orbit"])
     term = json.dumps(rng.choice(TERMS))
-    own = re.sub("^term = .*", lambda _: f"term = {term}", MODEL, flags=re.MULTILINE).encode()
-    files = {"m.toml": own if rng.random() < 0.3 else spoiled(rng, MODEL)}
+    changed = re.sub("^term = .*", lambda _: f"term = {term}", MODEL, flags=re.MULTILINE).encode()
+    files = {"m.toml": changed if rng.random() < 0.3 else spoiled(rng, MODEL)}
     return Case([name, *SMALL[name], "--model=m.toml", "--json"], files)
 
 

@@ -73,8 +73,8 @@ def test_an_effect_is_named_in_four_files() -> None:
                 places[name].add(TWINS if place.startswith(TWINS) else place)
     laws = {f"{LIBRARY}/{name}.rs" for name in EFFECTS}  # one may use a function of another
     for name in EFFECTS - NAMED_ELSEWHERE:
-        own = f"{LIBRARY}/{name}.rs"
-        assert places[name] - (laws - {own}) == {own, f"{LIBRARY}/mod.rs", TWINS}
+        law = f"{LIBRARY}/{name}.rs"
+        assert places[name] - (laws - {law}) == {law, f"{LIBRARY}/mod.rs", TWINS}
     for path in (f"{LIBRARY}/NAME.rs", f"{LIBRARY}/mod.rs", TWINS, "tests/rust/effects.rs"):
         assert path in how_to("Add an effect")
 
