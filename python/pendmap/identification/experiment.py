@@ -111,7 +111,7 @@ def identify(  # noqa: PLR0913 (each is asked for by name)
     ------
     InputError
         If a method or an effect is unknown, an effect acts on the drive or cannot be fitted, there
-        is no free decay, or the best fit does not follow the records.
+        is no free decay, its swings are impossible, or the best fit does not follow the records.
     OSError
         If a file cannot be read.
 

@@ -173,7 +173,7 @@ def test_bad_arguments_are_refused_on_one_line(
 
 
 def test_a_wrong_unit_is_reported_first(tmp_path: Path, pendmap_command: Run) -> None:
-    time, angle = record(decay(), seconds=20, seed=3)
+    time, angle = record(decay(), seconds=10, seed=3)
     (tmp_path / "lab").mkdir()
     written(tmp_path / "lab" / "run.csv", time, np.degrees(angle), names="theta")
     text = '[columns]\nangle = { name = "theta", unit = "rad" }\n[[run]]\nfile = "run.csv"\n'
@@ -186,8 +186,7 @@ def test_a_wrong_unit_is_reported_first(tmp_path: Path, pendmap_command: Run) ->
     # Nothing is searched where no pendulum swings like this.
     run = pendmap_command("identify", "lab")
     assert run.returncode == 2
-    assert "run: swings of 17" in run.stderr
-    assert "the unit or the scale is wrong" in run.stderr
+    assert re.search("run: swings of 1.. rad .*: the unit or the scale is wrong", run.stderr)
 
 
 def test_a_closed_pipe_is_no_failure(decay_file: Path, tmp_path: Path) -> None:

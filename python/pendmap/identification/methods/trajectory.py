@@ -210,8 +210,6 @@ def fit_together(
 
     The choices are those of :func:`fit_from_start`.
     """
-    if not runs:
-        raise InputError("runs must have one record or more, got none")
     readings = [reading_of_run(run) for run in runs]
     given = [as_fit_run(run, reading) for run, reading in zip(runs, readings, strict=True)]
     fit, worth = fit_from_start(given, readings, start=start, held=held, effects=effects)
