@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 
 INTERVAL, W0 = 0.02, 6.0
 RUNS, SAMPLES = 4, 800
-COUNT = 1.0
-"""Size of a count: all quantities here are in counts."""
+COUNT = 1.0  # Size of a count: all quantities here are in counts
 
 
 def swing(samples: int = SAMPLES) -> Floats:
@@ -51,10 +50,7 @@ def counted(rng: np.random.Generator, noise: Floats) -> Floats:
 
 
 def noise_of(residuals: Floats, floor: float = 0.0, *, fitted: bool = True) -> ResidualNoise:
-    """Return the residual noise in addition to the swing, which is fitted here.
-
-    ``floor`` is the variance of rounding, in the residuals' units squared.
-    """
+    """Return the noise beside the swing fitted here; ``floor`` is the variance of rounding."""
     if fitted:
         basis = swing(residuals.shape[1])
         residuals = residuals - residuals @ basis.T @ basis

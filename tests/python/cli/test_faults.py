@@ -102,13 +102,6 @@ def test_stdout_may_be_full(unbuffered: str) -> None:
     assert run.stderr == "pendmap: No space left on device\n"
 
 
-def test_free_space_is_checked_before_the_computation(tmp_path: Path) -> None:
-    with pytest.raises(OSError, match="are needed"):
-        check_room(tmp_path / "m.nc", 10**18)
-    check_room(tmp_path / "m.nc", 10)
-    assert list(tmp_path.iterdir()) == []
-
-
 @pytest.mark.parametrize(
     ("module", "words", "needs"),
     [
