@@ -16,10 +16,7 @@ if TYPE_CHECKING:
 
 @contextlib.contextmanager
 def started(words: Sequence[str], **given: Any) -> Iterator[subprocess.Popen[str]]:  # noqa: ANN401
-    """Start a process that receives Ctrl-C and ends with the test.
-
-    A process that a shell starts in the background ignores Ctrl-C, and its children inherit this.
-    """
+    """Start a process that receives Ctrl-C, also below a shell's job, and ends with the test."""
     process = subprocess.Popen(
         words,
         text=True,
@@ -33,13 +30,9 @@ def started(words: Sequence[str], **given: Any) -> Iterator[subprocess.Popen[str
             process.kill()
 
 
-PATIENCE = 120.0
-"""Seconds after which a process is taken to hang."""
-
-
 def until(process: subprocess.Popen[str], come: Callable[[], bool], step: float = 0.1) -> None:
     """Wait until a process has come so far, or has ended; fail if it takes too long."""
-    end = time.monotonic() + PATIENCE
+    end = time.monotonic() + 120.0  # s: then it is taken to hang
     while process.poll() is None and not come():
         assert time.monotonic() < end, f"{process.args} has not come so far"
         time.sleep(step)

@@ -1,8 +1,4 @@
-"""Small results in many tiles, and one that is stopped at one of its writes.
-
-``python tiled.py ANALYSIS STORE FAULT AT`` begins or goes on with a run; at write ``AT`` it is
-killed (``killed``), or the disk is full from there on (``full``); else it tells their number.
-"""
+"""Small results in many tiles; as a program, a run that is stopped at one of its writes."""
 
 from __future__ import annotations
 
@@ -14,7 +10,6 @@ import signal
 import sys
 from typing import TYPE_CHECKING, Any
 
-import fsspec
 import pytest
 import xarray as xr
 
@@ -42,17 +37,14 @@ CASES: dict[str, Callable[..., xr.Dataset]] = {
     "bifurcation": functools.partial(pendmap.bifurcation, Pendulum(), {"p": (0.2, 2.0, 40)}),
     "lifetime": functools.partial(pendmap.lifetime, Pendulum(p=1.7), starts=4000),
 }
-"""Analyses that are computed in tiles."""
 
 
 @functools.cache
 def plain(name: str) -> xr.Dataset:
-    """Return the result of one call, computed once in a process."""
     return case(name)
 
 
 def case(name: str, **keep: Any) -> xr.Dataset:  # noqa: ANN401 (of a run)
-    """Compute a case in a run with these options."""
     return CASES[name](run=RunOptions(**keep))
 
 
@@ -60,24 +52,17 @@ class StoppedError(Exception):
     """A run that is stopped by its progress."""
 
 
-def begun(analysis: Callable[..., Any], store: Path | str, share: float = 0.5, **keep: Any) -> None:  # noqa: ANN401
+def begun(analysis: Callable[..., Any], store: Path, share: float = 0.5) -> None:
     """Begin a run in a store, and stop it at a share of its work, when a tile is kept."""
-    system, folder = fsspec.core.url_to_fs(f"{store}.part/records")
+    records = store.with_name(f"{store.name}.part") / "records"
 
     def stop(done: int, total: int) -> None:
         # The search for attractors reports its progress too.
-        if done > share * total:
-            system.invalidate_cache()
-            if any(name.rsplit("/", 1)[-1].isdecimal() for name in system.find(folder)):
-                raise StoppedError
+        if done > share * total and any(path.name.isdecimal() for path in records.glob("*/*")):
+            raise StoppedError
 
     with pytest.raises(StoppedError):
-        analysis(run=RunOptions(store=store, progress=stop, **keep))
-
-
-def small_tiles() -> None:
-    """Let tiles of this process be small."""
-    importlib.import_module("pendmap.analysis.basin_tiles").TILE = TILE
+        analysis(run=RunOptions(store=store, progress=stop))
 
 
 def assert_same(one: xr.Dataset, other: xr.Dataset) -> None:
@@ -107,8 +92,9 @@ def stopped(fault: str, at: int, store: str, count: list[int]) -> None:
 
 
 if __name__ == "__main__":
+    # It is killed at the write ``at``, or the disk is full from there on, or it tells their number.
     name, place, fault, at = sys.argv[1:]
-    small_tiles()
+    importlib.import_module("pendmap.analysis.basin_tiles").TILE = TILE
     writes = [0]
     stopped(fault, int(at), place, writes)
     case(name, store=place, resume=True)

@@ -8,6 +8,7 @@ import json
 import os
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypedDict
 
 import numpy as np
@@ -28,7 +29,6 @@ from pendmap.errors import (
     instruction_set,
     short_repr,
 )
-from pendmap.files.dataset import reached
 from pendmap.files.variables import FORMAT_VERSION
 from pendmap.model import model_text
 
@@ -72,9 +72,8 @@ class RunOptions:
     progress : callable, optional
         Called repeatedly with the units of work done and in total: a :class:`pendmap.ProgressBar`.
     store : str or path, optional
-        A Zarr store, a path or an address of fsspec like ``s3://bucket/map.zarr``: the result is
-        computed in tiles, and each is kept as it is done, in ``map.zarr.part``. An earlier result
-        is there until the new one is complete.
+        A Zarr store, ``map.zarr``: the result is computed in tiles, and each is kept as it is
+        done, in ``map.zarr.part``. An earlier result is there until the new one is complete.
     resume : bool
         Whether to go on with the store of a run that was stopped; the result is the same, bit for
         bit. A store that another request began is refused.
@@ -109,7 +108,7 @@ class RunOptions:
         object.__setattr__(self, "seed", check_whole("seed", self.seed, 0, MOST_SEED))
         check_callable("progress", self.progress)
         if self.store is not None:
-            _address(self.store)
+            _folder(self.store)
         if check_flag("resume", self.resume) and self.store is None:
             raise InputError("resume must be given with a store (.zarr), got none")
         if self.executor is not None and not hasattr(self.executor, "submit"):
@@ -163,16 +162,14 @@ class RunOptions:
         """Return the result of ``compute``, or of the store if it is complete there."""
         if self.store is None:
             return compute(Work(job, Store(), self.executor, self.progress))
-        store = FileStore(_address(self.store))
+        store = FileStore(_folder(self.store))
         with store.held():
-            with reached(store.address):
-                result = store.begin(_request(name, model, arguments), resume=self.resume)
+            result = store.begin(_request(name, model, arguments), resume=self.resume)
             if result is None:
                 work = Work(job, store, self.executor, self.progress)
                 with work.named(store.unfinished):
                     result = compute(work)
-                    with reached(store.address):
-                        store.complete(result)
+                    store.complete(result)
         return result
 
 
@@ -223,14 +220,12 @@ class Numerics:
         }
 
 
-def _address(store: str | os.PathLike[str]) -> str:
-    """Return the address of a store; a folder must be named like one."""
-    name = os.fspath(store) if isinstance(store, str | os.PathLike) else ""
-    name = name.removeprefix("file://").rstrip("/")
-    if "://" not in name and not name.endswith(".zarr"):
-        form = "a folder NAME.zarr, or an address like s3://bucket/map.zarr"
-        raise InputError(f"store must be {form}, got {short_repr(store)}")
-    return name
+def _folder(store: str | os.PathLike[str]) -> Path:
+    """Return the folder of a store, which must be named like one."""
+    path = Path(store) if isinstance(store, str | os.PathLike) else Path()
+    if path.suffix != ".zarr":
+        raise InputError(f"store must be a folder NAME.zarr, got {short_repr(store)}")
+    return path
 
 
 def _request(name: str, model: Pendulum | Rig, arguments: Mapping[str, Any]) -> dict[str, Any]:

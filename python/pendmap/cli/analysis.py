@@ -27,7 +27,6 @@ from pendmap.cli.parse.options import (
     window_options,
 )
 from pendmap.cli.parse.signature import GROUPS, options_of, parameters
-from pendmap.cli.parse.types import Address
 from pendmap.cli.show import begin, made_here, show
 from pendmap.errors import named
 
@@ -205,7 +204,7 @@ def command_of(name: str) -> click.Command:
         arguments = _arguments(name, pendulum, outputs, given)
         module = importlib.import_module(f"pendmap.analysis.{kind}")
         store = outputs.store if entry.stored else None
-        if arguments.get("draws") and not isinstance(store, Address):
+        if arguments.get("draws"):
             store = None  # draws are written when all are computed
         with made_here(), outputs.progress(name) as progress:
             if "run" in declared:
@@ -261,7 +260,6 @@ def _arguments(
             given["live"] = viewer.Live(model, (given["theta"], given["velocity"]), given["live"])
     if name == "tongues":
         given |= {"omega": given.pop("omegas"), "refine": bool(outputs.files)}
-    outputs.check_room(cells)
     if name == "basins" and (outputs.path("plot") or outputs.path("rerun")):
         from pendmap import _core
         from pendmap.charts.basins import BYTES_OF_CELL

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path, PurePath
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from pendmap.cli.parse.options import argument, group, new_command, output_options
 from pendmap.cli.parse.signature import options_of, parameters
-from pendmap.cli.parse.types import RESULT, Address, OptionType
+from pendmap.cli.parse.types import FILE, OptionType
 from pendmap.cli.show import Outputs
 from pendmap.errors import InputError, named
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
 def _size(text: str) -> tuple[float, float]:
@@ -36,22 +38,19 @@ _LAYER = OptionType(
     "pendmap plot basins.nc --width 86 --no-title --out column.pdf",
     "pendmap plot basins.nc --out basins.rrd",
 )
-@argument("file", "FILE", RESULT)
+@argument("file", "FILE", FILE)
 @options_of(
     _DRAW, "layer size width dpi colormap title", _LOOK, layer=_LAYER, size=OptionType("WxH", _size)
 )
 @output_options((), json="")
-def command(*, file: Path | Address, **given: Any) -> None:  # noqa: ANN401 (outputs, look)
+def command(*, file: Path, **given: Any) -> None:  # noqa: ANN401 (outputs, look)
     """Draw a result again, in another size, colours or layer, without computing.
 
-    FILE is a result, .nc or .zarr, or the address of a .zarr. Figures and recordings are written;
-    if none is named, FILE.png, for an address in this folder.
+    FILE is a result, .nc or .zarr. Figures and recordings are written; if none is named, FILE.png.
     """
-    at_address = isinstance(file, Address)
-    if not PurePath(file).name:
+    if not file.name:
         raise click.UsageError(f"{str(file)!r}: must be a result, .nc or .zarr, it is a folder")
-    name = PurePath(file).stem if at_address else str(PurePath(file).with_suffix(""))
-    outputs = Outputs.take(given, name, [] if at_address else [Path(file)], default=("plot",))
+    outputs = Outputs.take(given, str(file.with_suffix("")), [file], default=("plot",))
 
     from pendmap.files.dataset import load
 

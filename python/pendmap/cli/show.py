@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import click
 
 from pendmap.cli.parse.model_options import model_from
-from pendmap.cli.parse.types import PICTURES, REPORTS, Address, default_file
+from pendmap.cli.parse.types import PICTURES, REPORTS, default_file
 from pendmap.errors import InputError, NotWrittenError, escaped, named, one_line
-from pendmap.files import COMPLETE, check_room, held_interrupts
+from pendmap.files import COMPLETE, held_interrupts
 from pendmap.formatting import columns, duration, json_text, wrapped
 
 if TYPE_CHECKING:
@@ -119,7 +119,7 @@ class File(NamedTuple):
     """A file to write."""
 
     kind: str  # key of _ENDS
-    path: Path | Address
+    path: Path
     option: str = "--out"  # that names it
 
 
@@ -175,18 +175,12 @@ class Outputs:
                 viewer.check_display()
         return cls(tuple(every), **switches, left_out=left_out, kept=there)
 
-    def path(self, kind: str) -> Path | Address | None:
+    def path(self, kind: str) -> Path | None:
         """Return the first file of a kind."""
         return next((file.path for file in self.files if file.kind == kind), None)
 
-    def check_room(self, cells: int) -> None:
-        """Refuse a map if the disk lacks half a byte a cell, the least compressed size."""
-        for kind, path, _ in self.files:
-            if kind != "plot" and isinstance(path, Path):
-                check_room(path, cells // 2)
-
     @property
-    def store(self) -> Path | Address | None:
+    def store(self) -> Path | None:
         """The Zarr store that --out names."""
         results = (file.path for file in self.files if file.kind == "out")
         return next((p for p in results if str(p).lower().rstrip("/").endswith(".zarr")), None)
@@ -206,7 +200,7 @@ class Outputs:
         from pendmap.engine.bar import ProgressBar
 
         with ProgressBar(name, leave=False) as bar:
-            announce = forecast(bar.write)
+            announce = forecast(functools.partial(bar.write, file=sys.stderr))
 
             def report(done: int, total: int) -> None:
                 announce(done, total)
@@ -219,7 +213,7 @@ class Outputs:
         result: Any,  # noqa: ANN401 (a dataset, or what was found in records)
         model: Write | None = None,
         *,
-        stored: Path | Address | None = None,
+        stored: Path | None = None,
         keep: bool = False,
         **look: Any,  # noqa: ANN401 (arguments of the figure)
     ) -> Written:
@@ -227,7 +221,7 @@ class Outputs:
 
         def writers() -> Iterator[tuple[Write, Path]]:
             for kind, path, _ in self.files:
-                if isinstance(path, Address) or path == stored:
+                if path == stored:
                     continue
                 if model is not None and kind == "model":
                     yield model, path
@@ -283,14 +277,7 @@ def free_name(
 def keep_files(files: Iterable[File]) -> None:
     """Refuse files and stores that exist."""
     for _, path, option in files:
-        if isinstance(path, Address):
-            from pendmap.files.dataset import reached, sealed
-
-            with reached(path):
-                exists = bool(sealed(path))
-        else:
-            exists = path.exists()
-        if exists:
+        if path.exists():
             raise click.UsageError(
                 f"Invalid value for '{option}': {str(path)!r}: must be a new file, got one that"
                 " exists: --overwrite replaces it"
@@ -301,7 +288,7 @@ def keep_inputs(inputs: Iterable[Path | None], files: Iterable[File]) -> None:
     """Refuse outputs that are inputs, or folders of inputs."""
     read = [path for path in inputs if path is not None and path.exists()]
     for _, output, option in files:
-        if isinstance(output, Address) or not output.exists():
+        if not output.exists():
             continue
         folders = [folder for path in read for folder in path.resolve().parents]
         if any(output.samefile(p) for p in (folders if output.is_dir() else read)):
@@ -320,9 +307,7 @@ def made_here() -> Iterator[None]:
         yield
 
 
-def show(
-    dataset: xr.Dataset, outputs: Outputs, schema: Schema, stored: Path | Address | None = None
-) -> None:
+def show(dataset: xr.Dataset, outputs: Outputs, schema: Schema, stored: Path | None = None) -> None:
     """Write the files asked for, then JSON or the summary to stdout; ``stored`` is its store."""
     complete = [] if stored is None else [str(stored)]
     COMPLETE.extend(complete)
@@ -341,7 +326,7 @@ class Written(list[str]):
         self.missed: list[str] = []
         self.refused: list[InputError] = []
 
-    def name(self, path: Path | Address | None) -> str | None:
+    def name(self, path: Path | None) -> str | None:
         """Return the name of a file if it is complete, else None."""
         return str(path) if str(path) in self else None
 

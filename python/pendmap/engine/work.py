@@ -15,8 +15,8 @@ import hashlib
 import io
 import json
 import os
+import shutil
 import threading
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -27,7 +27,8 @@ from pendmap.files.atomic import lock
 from pendmap.formatting import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, MutableMapping
+    from collections.abc import Callable, Iterable, Iterator
+    from pathlib import Path
 
     import xarray as xr
     from numpy.typing import NDArray
@@ -37,14 +38,12 @@ if TYPE_CHECKING:
 _REQUEST: Final = "request"  # The first record
 _CHECK: Final = 32  # Bytes of a SHA-256, at the beginning of a record in a file
 _PARTS: Final = 1000  # Units of progress of a tile
-_ROUNDING: Final = {"avx512": "fused", "avx2": "fused"}
-"""How instruction sets multiply and add: with one rounding, or with two."""
 
 
 def rounding() -> str:
     """Return the class of the instruction set in use: equal requests of a class give equal bits."""
     name = instruction_set()
-    return _ROUNDING.get(name, name)
+    return "fused" if name in {"avx512", "avx2"} else name  # they round once after multiply and add
 
 
 def pack(**arrays: Any) -> dict[str, NDArray[Any]]:
@@ -64,43 +63,33 @@ class Store:
     """Records in the memory of this process."""
 
     def __init__(self) -> None:
-        self.records: MutableMapping[str, Any] = {}
+        self._records: dict[str, Any] = {}
 
     def get(self, name: str) -> Any:
         """Return a record, or None if there is none."""
-        return self.records.get(name)
+        return self._records.get(name)
 
     def put(self, name: str, record: Any) -> None:
         """Write a record."""
-        self.records[name] = record
-
-    def done(self, step: str) -> set[int]:
-        """Return the tiles of a step whose record is there."""
-        names = (name.rpartition("/") for name in self.records)
-        return {int(tile) for folder, _, tile in names if folder == step}
+        self._records[name] = record
 
 
 class FileStore(Store):
-    """A run at a path or an address: its records are in ``map.zarr.part`` until it is complete."""
+    """A run at a path: its records are in ``map.zarr.part/records`` until it is complete."""
 
-    def __init__(self, address: str) -> None:
-        super().__init__()
-        self.address = address.rstrip("/")
-        self.unfinished = f"{self.address}.part"
-        self._system, self._path = dataset.place(self.address)
-        self.records = self._system.get_mapper(f"{self._path}.part/records")
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.unfinished = path.with_name(f"{path.name}.part")
+        self._folder = self.unfinished.absolute() / "records"
         self._request: dict[str, Any] = {}
         self._begun = True
 
     @contextlib.contextmanager
     def held(self) -> Iterator[None]:
-        """Hold a store at a path while a run writes it; InputError if another run does."""
-        if not dataset.is_local(self.address):
-            yield
-            return
-        path = Path(f"{self._path}.lock")
+        """Hold the store while a run writes it; InputError if another run does."""
+        path = self.path.with_name(f"{self.path.name}.lock").absolute()
         if not path.parent.is_dir():
-            raise FileNotFoundError(2, "the folder does not exist", str(path.parent))
+            raise FileNotFoundError(2, "the folder does not exist", str(self.path.parent))
         with path.open("wb") as file:
             if hasattr(os, "register_at_fork"):  # a child may outlive the run
                 os.register_at_fork(after_in_child=file.close)
@@ -110,8 +99,7 @@ class FileStore(Store):
             except OSError as error:  # without locks nothing keeps two runs apart
                 alone = not isinstance(error, BlockingIOError | FileNotFoundError)
             if not alone:
-                text = "is held by another run: a store has one run at a time"
-                raise InputError(f"{self.address}: {text}")
+                raise InputError(f"{self.path}: is held by another run, a store has one at a time")
             try:
                 yield
             finally:
@@ -120,22 +108,22 @@ class FileStore(Store):
     def begin(self, request: dict[str, Any], *, resume: bool) -> xr.Dataset | None:
         """Begin a run or go on with one; return its result if it is complete."""
         self._request = request
-        seal = dataset.sealed(self.address) if resume else None
+        seal = dataset.sealed(self.path) if resume else None
         stored = self.get(_REQUEST)
         if seal is not None and (stored is None or seal[_REQUEST] == request):
             self._check(seal[_REQUEST] or {})
-            result: xr.Dataset = dataset.load(self.address)
+            result: xr.Dataset = dataset.load(self.path)
             self._clear()
             return result
-        if stored is not None and not resume:
-            goes_on = "is an unfinished run: --resume (resume=True) goes on with it"
-            raise InputError(f"{self.unfinished}: {goes_on}; a new run must have another name")
         if stored is not None:
+            if not resume:
+                goes_on = "is an unfinished run: --resume (resume=True) goes on with it"
+                raise InputError(f"{self.unfinished}: {goes_on}; a new run must have another name")
             self._check(json.loads(stored))
-        elif {*self.records} - {_REQUEST}:
+        elif any(file.name != _REQUEST for file in self._folder.glob("*")):
             raise InputError(f"{self.unfinished}: is no run, or is damaged: it must be removed")
         else:
-            dataset.check_replaceable(self.address)
+            dataset.check_replaceable(self.path)
             self._begun = False
         return None
 
@@ -145,12 +133,12 @@ class FileStore(Store):
             before, now = stored.get(key), self._request.get(key)
             if before != now:
                 words = f"{key} = {short_repr(before)}, not {short_repr(now)}"
-                raise InputError(f"{self.address}: was begun with {words}")
+                raise InputError(f"{self.path}: was begun with {words}")
 
     def get(self, name: str) -> Any:
         """Return the bytes of a record; None if there is none, or a kill or damage has cut it."""
-        with dataset.reached(self.address):
-            data = self.records.get(name, b"")
+        path = self._folder / name
+        data = path.read_bytes() if path.exists() else b""
         content = data[_CHECK:]
         return content if hashlib.sha256(content).digest() == data[:_CHECK] else None
 
@@ -160,30 +148,22 @@ class FileStore(Store):
             self._begun = True
             self.put(_REQUEST, json.dumps(self._request).encode())
         if not isinstance(record, bytes):
-            stream = io.BytesIO()
-            np.savez(stream, **record)
+            np.savez(stream := io.BytesIO(), **record)
             record = stream.getvalue()
-        with dataset.reached(self.address):
-            self.records[name] = hashlib.sha256(record).digest() + record
-
-    def done(self, step: str) -> set[int]:
-        """Return the tiles of a step whose record is there."""
-        with dataset.reached(self.address):
-            return super().done(step)
+        path = self._folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(hashlib.sha256(record).digest() + record)
 
     def complete(self, result: xr.Dataset) -> None:
         """Write the result, and remove the records."""
-        if dataset.is_local(self.address):
-            dataset.check_replaceable(self.address)
-        dataset.write_store(result, self.address, self._request)
+        dataset.write_store(result, self.path, self._request)
         self._clear()
 
     def _clear(self) -> None:
         """Remove the records; other files are left alone."""
-        if self._system.exists(f"{self._path}.part/records"):
-            self._system.rm(f"{self._path}.part/records", recursive=True)
+        shutil.rmtree(self._folder, ignore_errors=True)
         with contextlib.suppress(OSError):
-            self._system.rmdir(f"{self._path}.part")
+            self.unfinished.rmdir()
 
 
 @dataclasses.dataclass
@@ -200,21 +180,16 @@ class Work:
     tiles: int = 0
 
     @contextlib.contextmanager
-    def named(self, address: str) -> Iterator[None]:
-        """Let errors of the disk and interrupts tell what the store at ``address`` keeps."""
+    def named(self, path: Path) -> Iterator[None]:
+        """Let errors of the disk and interrupts tell what the store at a path keeps."""
         try:
             yield
-        except KeyboardInterrupt:
-            COMPLETE.append(f"{address} ({self._stored})")
-            raise
-        except OSError as error:
-            if error.errno is None:
-                raise NotWrittenError(f"{error}; {self._stored}") from error
-            raise OSError(error.errno, f"{error.strerror}; {self._stored}", address) from error
-
-    @property
-    def _stored(self) -> str:
-        return f"{self.tiles_done} of {counted(self.tiles, 'tile')} are kept, --resume goes on"
+        except (KeyboardInterrupt, OSError) as error:
+            text = f"{self.tiles_done} of {counted(self.tiles, 'tile')} are kept, --resume goes on"
+            if isinstance(error, KeyboardInterrupt):
+                COMPLETE.append(f"{path} ({text})")
+                raise
+            raise NotWrittenError(f"{path}: {error.strerror or error}; {text}") from error
 
     def once(self, name: str, make: Callable[[], Any]) -> Any:
         """Return a record; make and store it if it is not there."""
@@ -226,11 +201,10 @@ class Work:
 
     def each(self, step: str, state: str, tiles: Iterable[int]) -> Iterator[tuple[int, Any]]:
         """Yield tiles with their records, computed from the record ``state`` if not there yet."""
-        done, wanted = self.store.done(step), list(tiles)
-        missing = []
+        wanted, missing = list(tiles), []
         self.tiles, self.tiles_done = len(wanted), 0
         for tile in wanted:
-            record = self.store.get(f"{step}/{tile}") if tile in done else None
+            record = self.store.get(f"{step}/{tile}")
             if record is None:
                 missing.append(tile)
                 continue
@@ -259,8 +233,7 @@ class Work:
         if self.executor is not None:
             yield from _results(self.executor, tiles, call)
         elif self.job.at_once == 1:
-            for tile in tiles:
-                yield tile, _tile(*call(tile), self._report)
+            yield from ((tile, _tile(*call(tile), self._report)) for tile in tiles)
         else:
             with concurrent.futures.ThreadPoolExecutor(self.job.at_once) as pool:
                 try:

@@ -6,7 +6,6 @@ from typing import Any
 
 from pendmap.files.atomic import COMPLETE as COMPLETE
 from pendmap.files.atomic import STOPS as STOPS
-from pendmap.files.atomic import check_regular as check_regular
 from pendmap.files.atomic import check_room as check_room
 from pendmap.files.atomic import held_interrupts as held_interrupts
 from pendmap.files.atomic import read_whole as read_whole

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
-import re
 import shutil
 import signal
 import stat
@@ -29,11 +28,9 @@ COMPLETE: Final[list[str]] = []  # Files written so far; the message of an inter
 STOPS: Final = tuple(
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
 )
-# Name of a stage, the temporary folder in which files are written before they are moved
-_STAGE: Final = re.compile(r"\.pendmap-\w{8}\.part")
+_STAGE: Final = ".pendmap-????????.part"  # Folder in which files are written before they are moved
 _OWNER: Final = "owner"  # File in a stage that its process keeps locked
 _PROBE: Final = 2**20  # Bytes of a trial write, which fails on a full disk, and of one read
-_LEAST: Final = 4096  # Bytes of the trial write before a computation: one block of most disks
 
 
 @contextlib.contextmanager
@@ -43,15 +40,14 @@ def held_interrupts() -> Iterator[None]:
         yield
         return
     held: list[int] = []
-    before = {number: signal.getsignal(number) for number in STOPS}
-    holding = [number for number in STOPS if before[number] not in (signal.SIG_IGN, None)]
-    for number in holding:
+    before = {n: one for n in STOPS if (one := signal.getsignal(n)) not in (signal.SIG_IGN, None)}
+    for number in before:
         signal.signal(number, lambda number, _: held.append(number))
     try:
         yield
     finally:
-        for number in reversed(holding):  # Ctrl-C last: it may raise at once
-            signal.signal(number, before[number])
+        for number, handler in reversed(before.items()):  # Ctrl-C last: it may raise at once
+            signal.signal(number, handler)
         if held:
             signal.raise_signal(held[0])
 
@@ -78,7 +74,7 @@ def whole_file(path: str | os.PathLike[str], suffixes: Sequence[str]) -> Iterato
 def whole_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yield a temporary path for a new folder; move it to ``path``, in the place of one there."""
     target = Path(path).resolve()
-    with _stage(Path(path), target.parent) as stage:
+    with _stage(target) as stage:
         new, old = (stage / kind / target.name for kind in ("new", "old"))
         new.parent.mkdir()
         old.parent.mkdir()
@@ -88,11 +84,7 @@ def whole_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
                 _sync(Path(folder, name))
         if target.exists():
             target.rename(old)
-        try:
-            new.rename(target)
-        except OSError:
-            _put_back(stage)
-            raise
+        new.rename(target)
         _sync(target.parent)
 
 
@@ -108,38 +100,29 @@ def _sync(path: Path) -> None:
 
 def read_whole(path: str | os.PathLike[str], most: int) -> bytes:
     """Return the bytes of a file; raise InputError for more than ``most``, a pipe or a device."""
-    source = Path(path)
-    check_regular(source)
-    at_once = getattr(os, "O_NONBLOCK", 0)  # do not block if a pipe has replaced the file
-    with open(source, "rb", opener=lambda name, flags: os.open(name, flags | at_once)) as stream:
-        check_regular(source, stream.fileno())
-        data = bytearray()
-        with _named(source):
-            while len(data) <= most and (read := stream.read(_PROBE)):
-                data += read
+    check_regular(path)
+    data = bytearray()
+    with _named(Path(path)), Path(path).open("rb") as stream:
+        while len(data) <= most and (part := stream.read(_PROBE)):
+            data += part
     if len(data) > most:
-        raise InputError(f"{source}: must be a file up to {most / 2**20:g} MiB, it is larger")
+        raise InputError(f"{path}: must be a file up to {most / 2**20:g} MiB, it is larger")
     return bytes(data)
 
 
-def check_regular(path: str | os.PathLike[str], descriptor: int | None = None) -> None:
+def check_regular(path: str | os.PathLike[str]) -> None:
     """Raise OSError for a folder or a missing file, InputError for a pipe or a device."""
-    status = Path(path).stat() if descriptor is None else os.fstat(descriptor)
-    if stat.S_ISDIR(status.st_mode):
+    mode = Path(path).stat().st_mode
+    if stat.S_ISDIR(mode):
         raise IsADirectoryError(errno.EISDIR, "must be a file, it is a folder", str(path))
-    if not stat.S_ISREG(status.st_mode):
+    if not stat.S_ISREG(mode):
         raise InputError(f"{path}: must be a file, it is a pipe or a device")
 
 
-def check_room(path: str | os.PathLike[str], size: int = 0) -> None:
-    """Raise OSError if a file or folder of ``size`` bytes cannot be written there."""
-    target = Path(path)
-    with _stage(target) as stage:
-        (stage / target.name).write_bytes(bytes(_LEAST))
-        free = shutil.disk_usage(stage).free
-    if free < size:
-        needed = f"the disk has {free / 1e6:.0f} MB free, {size / 1e6:.0f} MB are needed"
-        raise OSError(errno.ENOSPC, needed, str(target))
+def check_room(path: str | os.PathLike[str]) -> None:
+    """Raise OSError if no file can be written there."""
+    with _stage(Path(path)) as stage:
+        (stage / Path(path).name).write_bytes(bytes(4096))
 
 
 @contextlib.contextmanager
@@ -156,30 +139,38 @@ def _named(target: Path) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _stage(target: Path, folder: Path | None = None) -> Iterator[Path]:
+def _stage(target: Path) -> Iterator[Path]:
     """Yield a new folder beside a path, removed at the end; interrupts wait until then."""
-    folder = folder or target.parent
     with held_interrupts(), _named(target):
-        for other in folder.glob(".pendmap-*.part"):
-            if _STAGE.fullmatch(other.name) and not other.is_symlink():
-                with contextlib.suppress(OSError), (other / _OWNER).open("rb+") as owner:
-                    lock(owner)  # its process was killed
-                    _put_back(other)
-                    shutil.rmtree(other)
-        new = Path(tempfile.mkdtemp(".part", ".pendmap_", folder))
+        for other in target.parent.glob(_STAGE):
+            with contextlib.suppress(OSError), (other / _OWNER).open("rb+") as owner:
+                lock(owner)  # its process was killed
+                _remove(other)
+        new = Path(tempfile.mkdtemp(".part", ".pendmap_", target.parent))
         with (new / _OWNER).open("wb") as owner:
             with contextlib.suppress(OSError):
                 lock(owner)
-            stage = new.rename(folder / f".pendmap-{new.name.removeprefix('.pendmap_')}")
+            stage = new.rename(new.with_name(new.name.replace("_", "-", 1)))
             try:
                 yield stage
-            except (InputError, MemoryError, OSError):
-                raise
-            except Exception:  # the disk's own error is raised in place of an unspecific one
-                (stage / "probe").write_bytes(bytes(_PROBE))
+            except (
+                Exception
+            ) as error:  # the disk's own error is raised in place of an unspecific one
+                if not isinstance(error, InputError | MemoryError | OSError):
+                    (stage / "probe").write_bytes(bytes(_PROBE))
                 raise
             finally:
-                shutil.rmtree(stage, ignore_errors=True)
+                _remove(stage)
+
+
+def _remove(stage: Path) -> None:
+    """Remove a stage; a folder that was moved into it, and not replaced, is put back."""
+    if stage.is_symlink():
+        return
+    for old in stage.glob("old/*"):
+        if not (stage.parent / old.name).exists():
+            old.rename(stage.parent / old.name)
+    shutil.rmtree(stage, ignore_errors=True)
 
 
 def lock(file: IO[bytes]) -> None:
@@ -187,10 +178,3 @@ def lock(file: IO[bytes]) -> None:
     if fcntl is None:
         raise OSError(errno.ENOLCK, "this system has no locks")
     fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-
-
-def _put_back(stage: Path) -> None:
-    """Put back a folder that was moved into a stage and not replaced."""
-    for old in stage.glob("old/*"):
-        if not (stage.parent / old.name).exists():
-            old.rename(stage.parent / old.name)

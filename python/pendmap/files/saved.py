@@ -1,8 +1,4 @@
-"""Results of records as datasets: tables and arrays as named variables, all else as JSON.
-
-A table says which fields have arrays that become variables; arrays of several runs stand one after
-the other along their last dimension.
-"""
+"""Results of records as datasets: tables and arrays as named variables, all else as JSON."""
 
 from __future__ import annotations
 
@@ -19,7 +15,7 @@ import xarray as xr
 
 from pendmap import _core
 from pendmap.errors import InputError, short_repr
-from pendmap.files.variables import CONVENTIONS, FORMAT_VERSION, NO_YES, variable
+from pendmap.files.variables import CONVENTIONS, FORMAT_VERSION, flag, variable
 from pendmap.formatting import Readable
 
 if TYPE_CHECKING:
@@ -29,24 +25,18 @@ if TYPE_CHECKING:
     About = tuple[str, str, str] | Mapping[str, tuple[str, str, str]]
     """Dimensions (separated by spaces), unit and meaning of arrays; by name, of a matrix's rows."""
 
-_PACKAGE: Final = "pendmap."
-"""Beginning of the modules whose classes a file may name."""
-_LEFT_OUT: Final = frozenset(("experiment", "data", "joint", "fit"))
-"""Fields whose names are no part of the names of variables."""
+_PACKAGE: Final = "pendmap."  # Beginning of the modules whose classes a file may name
+_LEFT_OUT: Final = {"experiment", "data", "joint", "fit"}  # Fields that names of variables lack
 _PLAIN: Final[dict[str, Any]] = {"dict": dict, "list": list, "tuple": tuple, "Path": Path}
 
 
 class Saved(Readable):
     """A result that a file can hold."""
 
-    KIND: ClassVar[str]
-    """Its kind in files."""
-    ROWS: ClassVar[str]
-    """The dimension of its table in files."""
-    COLUMNS: ClassVar[Mapping[str, str]]
-    """Meaning of each column of its table; units are in the column ``unit``."""
-    ARRAYS: ClassVar[Mapping[str, About]]
-    """Arrays of its parts that are variables, by class and field."""
+    KIND: ClassVar[str]  # Its kind in files
+    ROWS: ClassVar[str]  # The dimension of its table in files
+    COLUMNS: ClassVar[Mapping[str, str]]  # Meaning of each column; units are in the column ``unit``
+    ARRAYS: ClassVar[Mapping[str, About]]  # Arrays that are variables, by class and field
 
     @abc.abstractmethod
     def to_dataframe(self) -> pd.DataFrame:
@@ -63,25 +53,23 @@ class Saved(Readable):
         statistics by name; those of several runs stand one after the other along one dimension. The
         attribute ``content`` is JSON of all that is no array.
         """
-        summary, further = str(self), self.further()
-        packed = _Packed(self.ARRAYS)
-        content = json.dumps(packed.plain(self))
-        data: dict[str, Any] = {**packed.variables(), **further}
-        table = self.to_dataframe().reset_index()
-        for name, column in table.items() if len(table) else ():
-            values = column.to_numpy()
-            values = values if values.dtype.kind in "biuf" else values.astype(str)
-            data[str(name)] = variable(self.ROWS, values, "", self.COLUMNS[str(name)])
+        packed, further = _Packed(self.ARRAYS), self.further()
         attributes = {
             "Conventions": CONVENTIONS,
             "kind": self.KIND,
             "format_version": FORMAT_VERSION,
             "title": repr(self),
-            "summary": summary,
+            "summary": str(self),
             "source": f"pendmap {_core.__version__}",
             "pendmap_version": _core.__version__,
-            "content": content,
+            "content": json.dumps(packed.plain(self)),
         }
+        data = packed.variables() | further
+        table = self.to_dataframe().reset_index()
+        for name, column in table.items() if len(table) else ():
+            values = column.to_numpy()
+            values = values if values.dtype.kind in "biuf" else values.astype(str)
+            data[str(name)] = variable(self.ROWS, values, "", self.COLUMNS[str(name)])
         return xr.Dataset(data, attrs=attributes)
 
 
@@ -161,10 +149,10 @@ class _Packed:
             for key in zip(over.split(), lengths, strict=True):
                 other = f"{name}_{key[0]}" if key[0] in dims.values() else key[0]
                 names += (dims.setdefault(key, other),)
-            truth = values.dtype.kind == "b"
-            flags = NO_YES if truth else None
-            values = values.astype(np.int8) if truth else values
-            made[name] = variable(names, values, units, meaning, flags=flags)
+            if values.dtype.kind == "b":
+                made[name] = flag(names, values, meaning)
+            else:
+                made[name] = variable(names, values, units, meaning)
             if len(parts) > 1:
                 labels = {k: label for k, (label, _) in enumerate(parts)}
                 owner = np.repeat(np.arange(len(parts), dtype=np.int16), lengths[-1])
@@ -204,8 +192,7 @@ def _instance(name: str, state: dict[str, Any]) -> Any:
     if not module.startswith(_PACKAGE):
         raise InputError(f"{short_repr(name)} is no class of pendmap")
     kind = getattr(importlib.import_module(module), short)
-    if lacking := {field.name for field in dataclasses.fields(kind)} - state.keys():
-        lacks = ", ".join(sorted(lacking))
+    if lacks := ", ".join({field.name for field in dataclasses.fields(kind)} - state.keys()):
         raise InputError(f"{short} lacks {lacks}: another version of pendmap wrote it")
     value = object.__new__(kind)
     value.__dict__.update(state)

@@ -13,7 +13,6 @@ import tomli_w
 from pendmap.errors import InputError
 from pendmap.files.atomic import read_whole
 
-_LONGEST: Final = 100  # Largest length of a table written on one line, characters
 _MOST_TOML: Final = 2**22  # Largest size of a TOML file, bytes; a thousand runs take a tenth
 _DEEPEST: Final = 20  # Most parts of a key: the time to read one grows with their square
 _PART: Final = rb"""(?:[\w-]+|"(?:[^"\\\n]|\\.)*"|'[^'\n]*')[ \t]*"""
@@ -27,39 +26,25 @@ def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
         raise InputError(f"{os.fspath(path)}: keys must have at most {_DEEPEST} parts, got more")
     try:
         return tomllib.loads(data.decode("utf-8-sig"))
-    except UnicodeDecodeError:
-        raise InputError(f"{os.fspath(path)}: not a TOML file: it is no text") from None
     except (ValueError, RecursionError) as error:  # too many digits are a ValueError
-        raise InputError(f"{os.fspath(path)}: not a TOML file: {error}") from None
+        reason = "it is no text" if isinstance(error, UnicodeDecodeError) else error
+        raise InputError(f"{os.fspath(path)}: not a TOML file: {reason}") from None
 
 
 def toml_text(content: Mapping[str, Any]) -> str:
-    """Return TOML with lists of tables as ``[[name]]`` and one key per line.
-
-    Raises TypeError or ValueError for values that TOML does not have.
-    """
+    """Return TOML, lists of tables as ``[[name]]``; TypeError for what TOML does not have."""
     plain: dict[str, Any] = {}
     blocks: list[str] = []
     for key, value in content.items():
         if isinstance(value, Mapping):
             blocks.append(tomli_w.dumps({key: value}))
         elif isinstance(value, list) and value and all(isinstance(v, Mapping) for v in value):
-            blocks += [_entry(key, table) for table in value]
+            for table in value:
+                lines = [_value({name: part})[2:-2] for name, part in table.items()]
+                blocks.append("\n".join([f"[[{key}]]", *lines, ""]))
         else:
             plain[key] = value
     return "\n".join([*([tomli_w.dumps(plain)] if plain else []), *blocks])
-
-
-def _entry(name: str, table: Mapping[str, Any]) -> str:
-    """Return the TOML of one ``[[name]]``; tables too long for a line follow as separate tables."""
-    lines, further = [f"[[{name}]]\n"], []
-    for key, value in table.items():
-        line = f"{_value({key: value})[2:-2]}\n"
-        if isinstance(value, Mapping) and len(line) > _LONGEST:
-            further.append(f"\n{tomli_w.dumps({name: {key: value}})}")
-        else:
-            lines.append(line)
-    return "".join(lines + further)
 
 
 def _value(value: object) -> str:

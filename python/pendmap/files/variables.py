@@ -19,23 +19,25 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+    Variable = tuple[Hashable, Any, dict[str, Any]]  # Dimensions, values and attributes
+
 CONVENTIONS: Final = "CF-1.11"
 FORMAT_VERSION: Final = 3  # Version of the layout, in the attribute ``format_version``
 MARKS: Final = frozenset(("format_version", "kind"))  # Attributes that mark a dataset as a result
 NO_YES: Final = {0: "no", 1: "yes"}  # Meanings of a flag
-_TEXT: Final = "_name"
-"""Suffix of a coordinate of text in a file: by CF those named as their dimension are numbers."""
+_TEXT: Final = (
+    "_name"  # Suffix of coordinates of text in files: by CF those of a dimension are numbers
+)
 _UDUNITS: Final = re.compile(r"(1|rad|m|mm|s|Hz)(/(rad|s)\d?)?")  # Units that UDUNITS-2 has too
 _ROWS: Final = {"bifurcation": "entry", "lifetime": "start", "tongues": "critical"}
 """Dimension of the rows of a table, where it is not that of the first variable."""
 _SPREAD: Final = {"bound": ("low", "high"), "eigenvalue": ("1", "2"), "part": ("re", "im")}
 """Dimensions whose places become columns, and the ends of their names."""
-_NOT_IN_FLAGS: Final = re.compile(r"[^\w@.+-]", re.ASCII)
-"""Characters that CF does not allow in ``flag_meanings``."""
+_NOT_IN_FLAGS: Final = re.compile(r"[^\w@.+-]", re.ASCII)  # Not allowed in ``flag_meanings``
 
 
 def variable(  # noqa: PLR0913 (attributes of CF)
-    dims: Hashable | tuple[Hashable, ...],
+    dims: Hashable,
     values: Any,
     units: str = "",
     long_name: str = "",
@@ -43,16 +45,13 @@ def variable(  # noqa: PLR0913 (attributes of CF)
     *,
     flags: Mapping[int, str] | None = None,
     missing: int | None = None,
-) -> tuple[Hashable | tuple[Hashable, ...], Any, dict[str, Any]]:
-    """Return a variable of a dataset with the attributes of CF that are not empty.
-
-    ``flags`` are the meanings of whole numbers, ``missing`` the number that means none.
-    """
+) -> Variable:
+    """Return a variable with attributes of CF; ``flags`` are meanings, ``missing`` means none."""
     units = units.replace("^", "")
     if units and not _UDUNITS.fullmatch(units):
         units, long_name = "1", f"{long_name}, in {units}"
-    attributes: dict[str, Any] = {"units": units, "long_name": long_name, "comment": comment}
-    attributes = {key: text for key, text in attributes.items() if text}
+    texts = {"units": units, "long_name": long_name, "comment": comment}
+    attributes: dict[str, Any] = {key: text for key, text in texts.items() if text}
     dtype = getattr(values, "dtype", None) or np.asarray(values).dtype  # reads no lazy array
     if flags is not None:
         attributes["flag_values"] = np.array([*flags], dtype=dtype)
@@ -63,12 +62,7 @@ def variable(  # noqa: PLR0913 (attributes of CF)
     return dims, values, attributes
 
 
-def flag(
-    dims: Hashable | tuple[Hashable, ...],
-    values: Any,
-    long_name: str,
-    flags: Mapping[int, str] = NO_YES,
-) -> tuple[Hashable | tuple[Hashable, ...], Any, dict[str, Any]]:
+def flag(dims: Any, values: Any, long_name: str, flags: Mapping[int, str] = NO_YES) -> Variable:
     """Return a variable that is 0 or 1, or another small number with a meaning."""
     return variable(dims, np.asarray(values, dtype=np.int8), "", long_name, flags=flags)
 
@@ -84,10 +78,8 @@ def stored_form(dataset: xr.Dataset) -> tuple[xr.Dataset, dict[Hashable, dict[st
 
 def restored(dataset: xr.Dataset) -> xr.Dataset:
     """Return a dataset read as it is stored with the types and names that it had."""
-    dataset.attrs = {
-        name: value.item() if isinstance(value, np.generic) else value
-        for name, value in dataset.attrs.items()
-    }
+    numbers = {name: one for name, one in dataset.attrs.items() if isinstance(one, np.generic)}
+    dataset.attrs |= {name: one.item() for name, one in numbers.items()}
     for one in dataset.variables.values():
         if one.dtype.kind in "OT":
             one.data = np.array(one.to_numpy().tolist(), dtype=str)
@@ -95,14 +87,11 @@ def restored(dataset: xr.Dataset) -> xr.Dataset:
         if missing is not None and one.dtype.kind in "iu":
             one.attrs["_FillValue"] = one.dtype.type(missing)
         if "flag_values" in one.attrs:  # one alone, or a list, became another type
-            flags = np.atleast_1d(one.attrs["flag_values"]).astype(one.dtype)
-            one.attrs["flag_values"] = flags
+            one.attrs["flag_values"] = np.atleast_1d(one.attrs["flag_values"]).astype(one.dtype)
         if "bounds" in one.encoding:
             one.attrs["bounds"] = one.encoding.pop("bounds")
     texts = {f"{name}{_TEXT}": name for name in dataset.dims if f"{name}{_TEXT}" in dataset}
-    named = {
-        name: (name, dataset[text].to_numpy(), dataset[text].attrs) for text, name in texts.items()
-    }
+    named = {name: dataset[text].variable for text, name in texts.items()}
     return dataset.drop_vars([*texts]).assign_coords(named)
 
 
@@ -132,10 +121,9 @@ class Accessor:
         column each: ``ci95_low``, ``multipliers_1_re``.
         """
         whole = self._dataset.reset_coords(drop=True)
-        some = {one.dims for one in whole.data_vars.values() if one.dims and one.size}
-        first = next(one.dims for one in whole.data_vars.values() if one.dims in some)
+        some = [one.dims for one in whole.data_vars.values() if one.dims and one.size]
         other = (_ROWS.get(whole.attrs["kind"], ""),)
-        rows = other if other in some else first
+        rows = other if other in some else some[0]
         columns = {}
         for name, values in whole.data_vars.items():
             further = [dim for dim in values.dims if dim not in rows]

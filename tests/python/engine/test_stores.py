@@ -1,147 +1,172 @@
-"""Stores: where they may be, what they refuse, what they leave."""
+"""Stores: what they refuse and leave, one run at a time, and damage: never a wrong number."""
 
 from __future__ import annotations
 
-import socket
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-import fsspec
-import numpy as np
 import pytest
-import xarray as xr
-from moto.server import ThreadedMotoServer
 
 import pendmap
 import tiled
+from interrupted import started
 from pendmap import Grid, InputError, Pendulum
+from pendmap.engine import FileStore
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable
     from pathlib import Path
+
+    import xarray as xr
 
     from conftest import Run
 
+MODEL = Pendulum(p=0.6)
 SMALL = ("basins", "--p", "0.6", "--grid", "30")
+BASINS = partial(pendmap.basins, Pendulum(gamma=0.2, p=0.6), Grid.square(60), check=False)
+DAMAGES: dict[str, Callable[[bytes, random.Random], bytes | None]] = {
+    "deleted": lambda _data, _draw: None,
+    "truncated": lambda data, draw: data[: draw.randrange(len(data))],
+    "flipped": lambda data, draw: flipped(data, draw.randrange(len(data)), draw.randrange(8)),
+}
 
 
-@pytest.fixture(scope="module")
-def bucket() -> Iterator[str]:
-    """A bucket of a local S3 server, one for all: fsspec keeps the connection to the first."""
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    server = ThreadedMotoServer("127.0.0.1", port, verbose=False)
-    server.start()
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("AWS_ENDPOINT_URL", f"http://127.0.0.1:{port}")
-        patch.setenv("AWS_DEFAULT_REGION", "us-east-1")
-        for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"):
-            patch.setenv(name, "any")
-        fsspec.filesystem("s3").mkdir("maps")
-        yield "s3://maps"
-    server.stop()
+def flipped(data: bytes, place: int, bit: int) -> bytes:
+    return data[:place] + bytes([data[place] ^ 1 << bit]) + data[place + 1 :]
 
 
-def test_a_store_may_be_in_an_object_store(bucket: str) -> None:
-    store, system = f"{bucket}/plane.zarr", fsspec.filesystem("s3")
-    tiled.begun(tiled.CASES["plane"], store)
-    with pytest.raises(InputError, match="is an unfinished run: --resume"):
-        tiled.case("plane", store=store)
-    with pytest.raises(InputError, match="is an unfinished run: its command"):
-        pendmap.load(store)
-    system.pipe_file("maps/plane.zarr/label/c/9", b"of a run that was killed when it wrote")
-    tiled.assert_same(tiled.case("plane", store=store, resume=True), tiled.plain("plane"))
-    tiled.assert_same(pendmap.load(store), tiled.plain("plane"))
-    pendmap.save(tiled.plain("plane"), store)  # replaces it
-    assert pendmap.load(store).identical(tiled.plain("plane"))
-    assert {name.split("/")[1] for name in system.find("maps")} == {"plane.zarr"}
-    system.pipe_file("maps/plane.zarr/notes.txt", b"mine")
-    with pytest.raises(InputError, match=r"it contains 'notes.txt', no part of a result"):
-        pendmap.save(tiled.plain("plane"), store)
-    system.rm_file("maps/plane.zarr/fraction/c/0/0/0")
-    with pytest.raises(InputError, match=r"s3://maps/plane\.zarr: lacks fraction/c/0/0/0"):
-        pendmap.load(store)
+def same_or_refused(call: Callable[[], xr.Dataset], truth: xr.Dataset) -> bool:
+    """Assert that a call returns a result or refuses it; return whether it does."""
+    try:
+        result = call()
+    except InputError:
+        return False
+    tiled.assert_same(result, truth)
+    return True
 
 
-def test_an_object_store_that_is_not_reached_is_told(
-    bucket: str, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("damage", DAMAGES)
+@pytest.mark.parametrize("state", ["begun", "complete"])
+def test_what_is_damaged_is_refused_or_computed_again(
+    damage: str, state: str, tmp_path: Path
 ) -> None:
-    def gone(*_: object, **__: object) -> None:
-        raise RuntimeError("no connection")
+    truth, draw = BASINS(), random.Random(damage)  # noqa: S311
+    begun = state == "begun"
+    if begun:
+        tiled.begun(BASINS, tmp_path / "whole.zarr", 0.6)
+    else:
+        BASINS(store=tmp_path / "whole.zarr")
+    (whole,) = tmp_path.iterdir()
+    files = sorted(file for file in whole.rglob("*") if file.is_file())
+    for file in draw.sample(files, min(6, len(files))):
+        store = tmp_path / "map.zarr"
+        copy = shutil.copytree(whole, tmp_path / whole.name.replace("whole", "map"))
+        data = DAMAGES[damage](file.read_bytes(), draw)
+        (copy / file.relative_to(whole)).unlink()
+        if data is not None:
+            (copy / file.relative_to(whole)).write_bytes(data)
+        loaded = begun or same_or_refused(lambda: pendmap.load(store), truth)  # noqa: B023
+        resumed = same_or_refused(lambda: BASINS(store=store, resume=True), truth)  # noqa: B023
+        assert resumed == loaded or file.name == "request", file
+        assert not loaded or begun or file.suffix == ".json", file
+        for left in tmp_path.glob("map.zarr*"):
+            shutil.rmtree(left)
 
-    monkeypatch.setattr("s3fs.S3FileSystem.find", gone)
-    with pytest.raises(OSError, match=r"s3://maps/x\.zarr: cannot be reached: no connection"):
-        tiled.case("basins", store=f"{bucket}/x.zarr")
+
+def piped(path: Path) -> None:
+    path.unlink()
+    os.mkfifo(path)
 
 
-def test_a_complete_store_is_replaced_only_on_request(pendmap_command: Run, tmp_path: Path) -> None:
-    words = (*SMALL, "--out", f"file://{tmp_path}/a.zarr", "--quiet")
-    assert pendmap_command(*words).returncode == 0
-    refused = pendmap_command(*words)
-    assert refused.returncode == 2
-    name = str(tmp_path / "a.zarr")
-    assert [str(path) for path in tmp_path.iterdir()] == [name]
-    assert f"{name!r}: must be a new file, got one that exists" in refused.stderr
-    for option in ("--resume", "--overwrite"):
-        run = pendmap_command(*words, option)
-        assert run.returncode == 0, run.stderr
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        (
+            lambda s: shutil.copy(s / "net_turns/c/0/0", s / "label/c/0/0"),
+            "label/c/0/0 was changed",
+        ),
+        (lambda s: shutil.rmtree(s / "label" / "c"), "lacks label/c/0/0"),
+        (lambda s: piped(s / "zarr.json"), "must be a file, it is a pipe or a device"),
+        (lambda s: piped(s / "label/c/0/0"), "must be a file, it is a pipe or a device"),
+        (lambda s: piped(s / "pendmap.json"), "must be a file, it is a pipe or a device"),
+    ],
+)
+def test_a_part_that_is_lost_or_another_is_named(
+    change: Callable[[Path], None], text: str, tmp_path: Path
+) -> None:
+    store = tmp_path / "map.zarr"
+    BASINS(store=store)
+    change(store)
+    for call in (partial(pendmap.load, store), partial(BASINS, store=store, resume=True)):
+        with pytest.raises(InputError, match=text):
+            call()
+
+
+def test_a_file_of_another_is_kept(tmp_path: Path) -> None:
+    store, truth = tmp_path / "map.zarr", BASINS()
+    tiled.begun(BASINS, store, 0.6)
+    notes = [tmp_path / "map.zarr.part" / "notes.txt", store / "notes.txt"]
+    notes[0].write_text("mine")
+    tiled.assert_same(BASINS(store=store, resume=True), truth)
+    assert notes[0].read_text() == "mine"
+    notes[1].write_text("mine")
+    tiled.assert_same(pendmap.load(store), truth)
+    with pytest.raises(InputError, match=r"it contains 'notes.txt', no part of a result"):
+        BASINS(store=store)
+
+
+@pytest.mark.parametrize("folder", ["map.zarr", "map.zarr.part/records"])
+def test_what_is_no_store_is_kept(tmp_path: Path, folder: str) -> None:
+    (tmp_path / folder).mkdir(parents=True)
+    (tmp_path / folder / "thesis.tex").write_text("mine")
+    before = sorted(tmp_path.rglob("*"))
+    for keep in ({}, {"resume": True}):
+        with pytest.raises(InputError, match=r"must be a new folder, or a result of|is no run"):
+            tiled.case("basins", store=tmp_path / "map.zarr", **keep)
+    assert sorted(tmp_path.rglob("*")) == before
 
 
 def test_other_requests_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     store, grid = tmp_path / "map.zarr", Grid.square(60)
-    tiled.begun(partial(pendmap.basins, Pendulum(p=0.6), grid), store)
+    tiled.begun(partial(pendmap.basins, MODEL, grid), store)
 
-    def refused(said: str, model: Pendulum, grid: Grid, **other: float) -> None:
-        with pytest.raises(InputError, match=said):
+    def refused(text: str, model: Pendulum, grid: Grid, **other: float) -> None:
+        with pytest.raises(InputError, match=text):
             pendmap.basins(model, grid, store=store, resume=True, **other)
 
     refused(r"was begun with model: p = '0.6', not '0.7'", Pendulum(p=0.7), grid)
-    refused("was begun with grid = ", Pendulum(p=0.6), Grid.square(61))
-    refused("was begun with tol = 1e-06, not 1e-07", Pendulum(p=0.6), grid, tol=1e-7)
+    refused("was begun with grid = ", MODEL, Grid.square(61))
+    refused("was begun with tol = 1e-06, not 1e-07", MODEL, grid, tol=1e-7)
     with pytest.raises(InputError, match="was begun with analysis = 'basins', not 'lifetime'"):
-        pendmap.lifetime(Pendulum(p=0.6), store=store, resume=True)
+        pendmap.lifetime(MODEL, store=store, resume=True)
     with pytest.raises(InputError, match=r"is an unfinished run: --resume \(resume=True\) goes on"):
-        pendmap.basins(Pendulum(p=0.6), grid, store=store)
+        pendmap.basins(MODEL, grid, store=store)
+    with pytest.raises(InputError, match=r"map\.zarr: is an unfinished run: its command"):
+        pendmap.load(store)
     with monkeypatch.context() as patch:
         patch.setenv("PENDMAP_SIMD", "portable")
-        refused("was begun with rounding of the processor = ", Pendulum(p=0.6), grid)
+        refused("was begun with rounding of the processor = ", MODEL, grid)
     monkeypatch.setattr("pendmap._core.__version__", "0.0.1")
-    refused(r"was begun with version of pendmap = '.*', not '0\.0\.1'", Pendulum(p=0.6), grid)
+    refused(r"was begun with version of pendmap = '.*', not '0\.0\.1'", MODEL, grid)
 
 
 def test_an_older_result_is_there_until_the_new_one_is(tmp_path: Path) -> None:
-    store, model = tmp_path / "map.zarr", Pendulum(p=0.6)
-    pendmap.basins(model, Grid.square(40), store=store)
-    tiled.begun(partial(pendmap.basins, model, Grid.square(60)), store)
+    store = tmp_path / "map.zarr"
+    pendmap.basins(MODEL, Grid.square(40), store=store)
+    tiled.begun(partial(pendmap.basins, MODEL, Grid.square(60)), store)
     assert pendmap.load(store).sizes["theta"] == 40
-    assert pendmap.basins(model, Grid.square(60), store=store, resume=True).sizes["theta"] == 60
+    assert pendmap.basins(MODEL, Grid.square(60), store=store, resume=True).sizes["theta"] == 60
     assert pendmap.load(store).sizes["theta"] == 60
     with pytest.raises(InputError, match="was begun with grid = "):  # a complete one neither
-        pendmap.basins(model, Grid.square(40), store=store, resume=True)
-    assert pendmap.basins(model, Grid.square(40), store=store).sizes["theta"] == 40
+        pendmap.basins(MODEL, Grid.square(40), store=store, resume=True)
+    assert pendmap.basins(MODEL, Grid.square(40), store=store).sizes["theta"] == 40
     assert [path.name for path in tmp_path.iterdir()] == ["map.zarr"]
-
-
-@pytest.mark.parametrize("kind", ["file", "folder", "group", "part"])
-def test_what_is_no_store_is_kept(tmp_path: Path, kind: str) -> None:
-    store = tmp_path / "map.zarr"
-    match kind:
-        case "file":
-            store.write_text("mine")
-        case "folder":
-            store.mkdir()
-            (store / "thesis.tex").write_text("mine")
-        case "group":
-            xr.Dataset({"x": ("t", [1.0])}).to_zarr(store, zarr_format=3, consolidated=False)
-        case "part":
-            (tmp_path / "map.zarr.part" / "records").mkdir(parents=True)
-            (tmp_path / "map.zarr.part" / "records" / "thesis.tex").write_text("mine")
-    before = sorted(tmp_path.rglob("*"))
-    for keep in ({}, {"resume": True}):
-        with pytest.raises(InputError, match=r"must be a new folder, or a result of|is no run"):
-            tiled.case("basins", store=store, **keep)
-    assert sorted(tmp_path.rglob("*")) == before
 
 
 def test_bad_input_leaves_no_store(tmp_path: Path) -> None:
@@ -151,7 +176,7 @@ def test_bad_input_leaves_no_store(tmp_path: Path) -> None:
 
 
 def test_the_command_keeps_and_resumes(tmp_path: Path, pendmap_command: Run) -> None:
-    tiled.begun(partial(pendmap.basins, Pendulum(p=0.6), 30), tmp_path / "a.zarr", 0.0)
+    tiled.begun(partial(pendmap.basins, MODEL, 30), tmp_path / "a.zarr", 0.0)
     again = pendmap_command(*SMALL, "--out", "a.zarr", "--resume", "--plot", "a.png")
     assert again.stdout.splitlines()[-1] == "Written: a.zarr, a.png"
     plain = pendmap_command(*SMALL, "--out", "b.nc")
@@ -159,4 +184,41 @@ def test_the_command_keeps_and_resumes(tmp_path: Path, pendmap_command: Run) -> 
     one, other = (pendmap.load(tmp_path / name) for name in ("a.zarr", "b.nc"))
     tiled.assert_same(one, other)
     assert "--resume --plot a.png" in one.attrs["history"]
-    assert np.array_equal(xr.open_zarr(tmp_path / "a.zarr").label, other.label)
+    refused = pendmap_command(*SMALL, "--out", f"file://{tmp_path}/a.zarr")
+    assert refused.returncode == 2
+    assert "a.zarr': must be a new file, got one that exists" in refused.stderr
+    for option in ("--resume", "--overwrite"):
+        run = pendmap_command(*SMALL, "--out", "a.zarr", option)
+        assert run.returncode == 0, run.stderr
+
+
+HOLDER = """
+import os, pathlib, sys, time
+from pendmap.engine import FileStore
+with FileStore(pathlib.Path(sys.argv[1])).held():
+    if child := os.fork():
+        print(child, flush=True)
+    time.sleep(60)
+"""
+
+
+def test_a_second_run_is_refused_until_the_first_is_killed_though_its_child_lives(
+    tmp_path: Path,
+) -> None:
+    words: list[Any] = [sys.executable, "-c", HOLDER, tmp_path / "map.zarr"]
+    with started(words, stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        child = int(process.stdout.readline())
+        for keep in ({}, {"resume": True}):
+            with pytest.raises(InputError, match="is held by another run"):
+                BASINS(store=words[-1], **keep)
+        process.kill()
+        process.wait(60)
+        with (
+            FileStore(words[-1]).held(),  # by a thread
+            pytest.raises(InputError, match="is held by another run"),
+        ):
+            BASINS(store=words[-1])
+        BASINS(store=words[-1])
+        os.kill(child, signal.SIGKILL)
+    assert [path.name for path in tmp_path.iterdir()] == ["map.zarr"]

@@ -26,10 +26,6 @@ MAP = pendmap.basins(MODEL, Grid.square(16))
 DIFFER = {"seconds", "history", "summary"}  # Attributes of equal results that may differ
 
 
-def swing() -> tuple[np.ndarray, np.ndarray]:
-    return record(decay(release=1.0, until=20.0), seconds=12)
-
-
 def own_axes() -> bytes:
     figure = Figure(figsize=(3.0, 3.0), dpi=50)
     FigureCanvasAgg(figure)
@@ -47,27 +43,18 @@ def calls(folder: Path) -> dict[str, Callable[[], Any]]:
     def file(end: str) -> Path:
         return folder / f"{threading.get_ident()}{end}"
 
-    rows, plane = np.column_stack(swing()), {"p": (0.5, 0.9, 2), "omega": (1.8, 2.2, 2)}
-    np.savetxt(folder / "a.csv", rows, delimiter=",", header="t_s,theta_rad", comments="")
+    plane = {"p": (0.5, 0.9, 2), "omega": (1.8, 2.2, 2)}
+    time, theta = record(decay(release=1.0, until=20.0), seconds=12)
     return {
         "save": lambda: again(MAP, file(".nc")),
         "save zarr": lambda: again(MAP, file(".zarr")),
         "basins": lambda: pendmap.basins(MODEL, Grid.square(12)),
-        "basins_of": lambda: pendmap.basins_of(MODEL, [0.0, 1.0], [0.1, 2.5]),
         "map": lambda: pendmap.parameter_map(Pendulum(), plane, starts=3),
         "plot": lambda: render.draw(MAP, file(".png"), dpi=40).read_bytes(),
         "sweep": lambda: pendmap.sweep(MODEL, {"p": [0.5, 0.6]}, grid=8),
-        "bifurcation": lambda: pendmap.bifurcation(Pendulum(), {"p": (0.5, 0.7, 3)}, starts=2),
-        "orbit": lambda: pendmap.orbit(MODEL, 1, 1, Grid.square(12)),
         "own axes": own_axes,
-        "lyapunov": lambda: pendmap.lyapunov(MODEL),
-        "lifetime": lambda: pendmap.lifetime(Pendulum(p=1.7), starts=100),
-        "tongues": lambda: pendmap.tongues(Pendulum(), [1.9, 2.0]),
-        "melnikov": lambda: pendmap.melnikov(Pendulum(), [1.0, 2.0]),
         "simulate": lambda: pendmap.simulate(MODEL, 1.0, 0.0, 20.0),
-        "advance": lambda: np.asarray(pendmap.advance(MODEL, [1.0], [0.0], 3)[0]),
-        "identify": lambda: str(again(pendmap.identify(folder / "a.csv"), file("_report.nc"))),
-        "noise_floor": lambda: pendmap.noise_floor(pendmap.read_experiment(folder / "a.csv")),
+        "identify": lambda: str(again(pendmap.identify(time, theta), file("_report.nc"))),
     }
 
 

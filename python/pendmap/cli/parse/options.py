@@ -159,19 +159,18 @@ def output_options(
     """Return --out, --plot, --rerun, --view, --overwrite, --json and --quiet.
 
     Suffixes are those of the files of data or text beside figures and recordings. What is
-    ``stored`` may be at an address, and is kept tile by tile in a .zarr.
+    ``stored`` is kept tile by tile in a .zarr.
     """
     kinds = [*suffixes, *PICTURES, *([".rrd"] if recording else [])]
     text = f"File to write, as its suffix says: {' '.join(kinds)}; may be repeated."
     if stored:
-        text += " A .zarr, also at an address like s3://, keeps tiles as they are done."
-    kind = types.output_or_address(*kinds) if stored else types.output_file(*kinds)
+        text += " A .zarr keeps tiles as they are done."
     viewed = (
         option("--rerun", types.output_file(".rrd"), "Rerun recording: .rrd.", group=OUTPUT),
         flag("--view", "Write the recording and open the viewer on it.", group=OUTPUT),
     )
     return added(
-        option("--out", kind, text, multiple=True, group=OUTPUT),
+        option("--out", types.output_file(*kinds), text, multiple=True, group=OUTPUT),
         option("--plot", types.output_file(*PICTURES), "Figure: .png .svg .pdf.", group=OUTPUT),
         *(viewed if recording else ()),
         overwrite_option,

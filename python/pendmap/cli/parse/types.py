@@ -143,26 +143,6 @@ def output_file(*suffixes: str) -> OptionType[Path]:
     return OptionType("file", functools.partial(_output, suffixes))
 
 
-class Address(str):
-    """Address of a store that is no path, like ``s3://bucket/map.zarr``."""
-
-    __slots__ = ()
-
-
-def output_or_address(*suffixes: str) -> OptionType[Path | Address]:
-    """Return the type of files to write, and of stores at an address."""
-
-    def read(text: str) -> Path | Address:
-        if text.startswith("file://") or "://" not in text:
-            return _output(suffixes, text)
-        if not text.lower().rstrip("/").endswith(".zarr"):
-            raise InputError(f"{text!r}: suffix of an address must be .zarr")
-        _import_library(text, ".zarr")
-        return Address(text)
-
-    return OptionType("file", read)
-
-
 def _output(suffixes: tuple[str, ...], text: str) -> Path:
     """Refuse a file that cannot be written; it may be written as ``file://`` and the path."""
     path = Path(text.removeprefix("file://"))
@@ -216,17 +196,15 @@ _LIBRARIES = {
 
 
 class _File(click.Path):
-    """A path, which may be written as ``file://`` and the path; or the address of a store."""
+    """A path, which may be written as ``file://`` and the path."""
 
-    def __init__(self, name: str, *, address: bool = False) -> None:
+    def __init__(self, name: str) -> None:
         super().__init__(path_type=Path, file_okay=name != "dir")
-        self.name, self.address = name, address
+        self.name = name
 
     def convert(self, value: Any, *words: Any) -> Any:  # noqa: ANN401 (as click)
-        """Return the path or the address."""
+        """Return the path."""
         plain = value.removeprefix("file://") if isinstance(value, str) else value
-        if self.address and "://" in str(plain):
-            return Address(plain)
         return super().convert(plain, *words)
 
 
@@ -244,7 +222,6 @@ def _methods() -> Iterable[str]:
 
 FILE = _File("file")
 FOLDER = _File("dir")
-RESULT = _File("file", address=True)
 INTEGER = OptionType("integer", _whole)
 NUMBER = OptionType("number", _number)
 AXIS = OptionType("A:B:N", _axis)
