@@ -35,7 +35,6 @@ def values(back: ReadBack, entity: str) -> np.ndarray:
 
 
 def colours(back: ReadBack, entity: str) -> dict[int, str]:
-    """Return the colours of an entity's classes."""
     context = back.columns[entity]["AnnotationContext:context"][0][0]
     infos = (one["class_description"]["info"] for one in context)
     return {info["id"]: f"#{info['color'] >> 8:06x}" for info in infos}
