@@ -1,16 +1,19 @@
-"""Figures drawn without a file, and their texts."""
+"""Figures drawn without a file, their texts, and the room for these."""
 
 from __future__ import annotations
 
 import itertools
 import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from matplotlib import pyplot as plt
 from matplotlib import rc_context
 from matplotlib.legend import Legend
 from matplotlib.text import Text
 
+import pendmap
 from pendmap import render
+from pendmap.charts import registry
 from pendmap.render import style
 
 if TYPE_CHECKING:
@@ -34,8 +37,8 @@ def plain(text: str) -> str:
 
 
 def titles(figure: Figure) -> list[str]:
-    found = (axes.get_title(loc="left") for axes in figure.axes)
-    return [re.sub(r"\s+", " ", text).removeprefix(f"({text[1:2]}) ") for text in found if text]
+    every = (axes.get_title(loc="left") for axes in figure.axes)
+    return [re.sub(r"\s+", " ", text).removeprefix(f"({text[1:2]}) ") for text in every if text]
 
 
 def named(figure: Figure) -> list[str]:
@@ -44,18 +47,9 @@ def named(figure: Figure) -> list[str]:
     return [plain(text.get_text()).replace("\n", " ") for box in boxes for text in box.get_texts()]
 
 
-def subtitle(figure: Figure) -> str:
-    return plain(figure.subfigs[0].get_suptitle())
-
-
 def written(figure: Figure) -> str:
-    texts = (found.get_text() for found in figure.findobj(Text) if isinstance(found, Text))
+    texts = (text.get_text() for text in figure.findobj(Text) if isinstance(text, Text))
     return plain(" ".join(" ".join(texts).split()))
-
-
-def shown(text: object) -> bool:
-    """Return whether a text is visible and not empty."""
-    return isinstance(text, Text) and text.get_visible() and bool(text.get_text().strip())
 
 
 def overlap(one: Bbox, other: Bbox) -> bool:
@@ -65,10 +59,15 @@ def overlap(one: Bbox, other: Bbox) -> bool:
     return bool(wide > 1.5 and high > 1.5)
 
 
+def assert_inside(figure: Figure, box: Bbox, name: str) -> None:
+    assert -1.5 < box.x0 <= box.x1 < figure.bbox.width + 1.5, name
+    assert -1.5 < box.y0 <= box.y1 < figure.bbox.height + 1.5, name
+
+
 def assert_room(figure: Figure) -> None:
     """Assert that no text is cut, covers another, or extends into another's panel."""
-    whole, boxes = figure.bbox, []
-    panels = [("a panel", axes.get_window_extent()) for axes in figure.axes if axes.axison]
+    boxes = []
+    panels = [axes.get_window_extent() for axes in figure.axes if axes.axison]
     beyond = {
         label  # matplotlib does not draw it
         for axes in figure.axes
@@ -77,15 +76,44 @@ def assert_room(figure: Figure) -> None:
         if not min(axis.get_view_interval()) <= at <= max(axis.get_view_interval())
     }
     for text in figure.findobj(Text):
-        if not shown(text) or text in beyond:
+        if not isinstance(text, Text) or text in beyond or not text.get_visible():
             continue
         name, box = text.get_text(), text.get_window_extent()
-        if box.width == 0:
+        if not name.strip() or box.width == 0:
             continue
-        assert whole.x0 - 1 <= box.x0 <= box.x1 <= whole.x1 + 1, name
-        assert whole.y0 - 1 <= box.y0 <= box.y1 <= whole.y1 + 1, name
-        boxes.append((name, box))
+        assert_inside(figure, box, name)
+        if not text.get_rotation() % 90:  # the box of turned text is larger than the text
+            boxes.append((name, box))
         if not any(text in axes.texts for axes in figure.axes):  # a warning
-            assert not [panel for _, panel in panels if overlap(box, panel)], name
+            assert not [panel for panel in panels if overlap(box, panel)], name
     for (one, a), (other, b) in itertools.combinations(boxes, 2):
         assert not overlap(a, b), (one, other)
+
+
+def assert_drawn(result: Any, *, parts: bool) -> None:  # noqa: ANN401 (of any analysis)
+    """Assert that a result is drawn whole, in 86 mm and by its parts, named and with room."""
+    chart = registry.of_result(result)
+    panels = [getattr(chart, "whole", lambda panel: panel)(panel) for panel in chart.panels]
+    for panel in panels:
+        sides = () if panel.bare else (panel.x, panel.y)
+        assert all(side.name or side.ticks for side in sides), panel.name
+    for look in ({}, {"width": 86.0, "title": False}):
+        figure = render.figure_of(result, dpi=100.0, **look)
+        with rc_context(style.RC):
+            figure.draw_without_rendering()
+        assert_room(figure)
+        names = {mark.name for panel in panels for mark in panel.marks} - {""}
+        assert {plain(name) for name in names} <= set(named(figure))
+    for k, panel in enumerate(panels if parts else ()):
+        size = [(6.4, 4.8), (4.0, 3.0), (9.0, 5.0), (3.4, 2.8)][k % 4]
+        figure, every = plt.subplots(1, 2 - k % 2, figsize=size, squeeze=False)
+        axes = every[0, -1]
+        assert pendmap.plot(result, axes, layer=panel.name) is axes
+        figure.draw_without_rendering()
+        assert axes.has_data() or not axes.axison
+        assert k % 2 or not every[0, 0].has_data()
+        legend = axes.get_legend()
+        boxes = [one.get_window_extent() for one in (*axes.texts, legend) if one is not None]
+        for box in (*boxes, *([axes.get_tightbbox()] if axes.axison else ())):
+            assert_inside(figure, box, panel.name)
+        plt.close(figure)

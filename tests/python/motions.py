@@ -11,11 +11,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-def integrated(*, p: float, cells: int = 60, periods: int = 120) -> xr.Dataset:
-    """Return basins whose attractors are periodic, ``cells`` a side."""
-    return pendmap.basins(Pendulum(p=p), cells, max_periods=periods)
-
-
 def chaotic(
     *, p: float = 1.7, gamma: float = 0.1, omega: float = 0.87, cells: int = 60, periods: int = 10
 ) -> xr.Dataset:

@@ -22,7 +22,6 @@ class ReadBack:
     def __init__(self, path: Path) -> None:
         reader = RrdReader(path)
         self.columns: dict[str, dict[str, list[Any]]] = {}
-        self.static: set[str] = set()
         self.recordings = reader.recordings()
         for chunk in reader.stream():
             batch = chunk.to_record_batch()
@@ -30,10 +29,7 @@ class ReadBack:
             for name in batch.schema.names:
                 column = batch.column(name)
                 entity[name] = entity.get(name, []) + column.to_pylist()
-            if chunk.is_static:
-                self.static.add(chunk.entity_path)
         self.views: dict[str, str] = {}
-        self.tabs: list[int] = []
         for store in reader.blueprints():
             for chunk in reader.stream(store=store):
                 batch = chunk.to_record_batch()
@@ -70,14 +66,3 @@ class ReadBack:
 
 def recorded(dataset: xr.Dataset, folder: Path) -> ReadBack:
     return ReadBack(viewer.record(dataset, folder / "a.rrd"))
-
-
-def scalars(back: ReadBack, entity: str) -> npt.NDArray[np.float64]:
-    return back.rows(entity, "Scalars:scalars")
-
-
-def hanging(back: ReadBack, bob: str, pivot: float) -> npt.NDArray[np.float64]:
-    """Return the angle of a pendulum whose arm has length 1."""
-    at = back.rows(bob, "Points2D:positions") - (pivot, 0.0)
-    assert np.allclose(np.hypot(*at.T), 1.0, atol=1e-5)
-    return np.arctan2(at[:, 0], -at[:, 1])

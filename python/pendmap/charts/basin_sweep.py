@@ -13,14 +13,11 @@ from pendmap.analysis.sweep_table import varied_names
 from pendmap.charts import names, palette, plane
 from pendmap.charts.chart import Axis, Chart, Panel, holding
 from pendmap.charts.legend import typeset
-from pendmap.charts.marks import QUIET, Band, Colours, Image, Level, Line, Points, Text, bars
+from pendmap.charts.marks import QUIET, Band, Colours, Image, Level, Line, Points, bars
 from pendmap.files import facts
-from pendmap.formatting import typographic
 from pendmap.units import Units
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     import xarray as xr
 
     from pendmap.charts.marks import Ends, Floats, Mark
@@ -90,34 +87,6 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
     known, others = [*LAYERS, *shares], [name for name in LAYERS if name not in _LEADING]
     varied, shown = (first, second), (_LEADING, others)
     return names.layers(dataset, varied, titles, make, known, shown, layer)
-
-
-def models(
-    dataset: xr.Dataset, cells: int
-) -> Iterator[tuple[list[tuple[str, float]], Panel, float]]:
-    """Yield the parameters of each model, row by row, its basins, and their height over width."""
-    dims, units = varied_names(dataset), Units.of(facts(dataset))
-    theta, velocity = (plane.outer_edges(dataset, axis) for axis in ("theta", "velocity"))
-    sides = names.phase_plane(theta, velocity, units)
-    ratio = names.proportion(theta, velocity, units)
-    classes = [("failed", palette.FAILED), ("undecided", palette.UNDECIDED)]
-    classes += listed(dataset, None)
-    planes = dataset[["label", "theta_bounds", "velocity_bounds"]]
-    for place in np.ndindex(*(dataset.sizes[dim] for dim in dims)):
-        at = [(dim, float(dataset[dim].values[k])) for dim, k in zip(dims, place, strict=True)]
-        one = planes.isel(dict(zip(dims, place, strict=True)))
-        label = plane.pixels(one, one["label"], cells)
-        here = np.ones(dataset.sizes["point"], dtype=bool)
-        for dim, value in at:
-            here &= dataset[f"point_{dim}"].values == value
-        points = plane.copies(dataset, plane.points(dataset)[here], *theta)
-        text = typographic(", ".join(f"{names.symbol(dim)} = {value:g}" for dim, value in at))
-        marks = [
-            Image(label.astype(np.int32) + 1, theta, velocity, classes=classes, path="labels"),
-            Points(*points.T, size=3.0, colour="#ffffff", path="attractors"),
-            Text(sum(theta) / 2, velocity[1], text, colour="#ffffff", path="values"),
-        ]
-        yield at, Panel("basin", "basins of attraction", *sides, marks), ratio
 
 
 def _line(dataset: xr.Dataset, dim: str, titles: tuple[str, str], layer: str | None) -> Chart:

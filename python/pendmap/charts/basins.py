@@ -51,6 +51,8 @@ LAYERS: Final = {
 
 def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -> Chart:
     """Return a panel for each layer, or for one alone; a figure shows the leading ones."""
+    if layer == "section":
+        return chart(dataset, cells=cells).only(layer)
     present = [name for name, one in LAYERS.items() if one.variable in dataset]
     if layer not in {None, *present}:
         raise InputError(f"no layer {layer!r} in this map; it has {', '.join(present)}")

@@ -21,15 +21,6 @@ if TYPE_CHECKING:
 
     from pendmap.charts.chart import Panel
 
-_FIRST = {
-    "Experiment": "history",
-    "Run": "history",
-    "IdentificationReport": "peaks",
-    "Comparison": "record",
-    "Discrepancy": "ranking",
-}
-"""Part of a result that is drawn if none is asked for, where it is not the first."""
-
 
 def plot(  # noqa: PLR0913 (all of these a user may choose)
     result: Any,  # noqa: ANN401 (a dataset, records, or what was found in records)
@@ -54,7 +45,8 @@ def plot(  # noqa: PLR0913 (all of these a user may choose)
         By default those of a new figure of pyplot, which a notebook shows. Axes that show something
         already keep their title and their names; limits and legend grow.
     layer : str, optional
-        The part; an unknown one is answered with those of the result.
+        The part, by default the first of the figure; an unknown one is answered with those of the
+        result.
     title : bool or str
         False for none, or a text.
     legend : bool, optional
@@ -128,11 +120,10 @@ def _panel(
     colours: Mapping[str, str],
     names: Mapping[str, str] | None,
 ) -> Panel:
-    """Return one part of a result, by default the leading one."""
+    """Return one part of a result, by default the first one with axes."""
     # Alone a part has no names that the other parts explain.
-    known = [] if layer else [panel.name for panel in registry.of_result(result).panels]
-    first = _FIRST.get(type(result).__name__)
-    layer = layer or (first if first in known else known[0])
+    every = () if layer else registry.of_result(result).panels
+    layer = layer or next(panel.name for panel in every if not panel.bare)
     chart = registry.of_result(result, layer=layer, colours=colours, names=names)
     if colormap is not None:
         chart = drawing.in_colours(chart, colormap)

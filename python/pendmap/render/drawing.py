@@ -236,7 +236,7 @@ def _warn(axes: Axes, warning: str) -> None:
 def shrink(axes: Axes) -> None:
     """Make words of a panel without a frame so small that they fit in its width."""
     for text in () if axes.axison else axes.texts:
-        for _ in range(3):  # letters have whole pixels: widths are not in proportion to sizes
+        for _ in range(9):  # letters have whole pixels: widths are not in proportion to sizes
             share = axes.bbox.width / max(text.get_window_extent().width, 1.0)
             text.set_fontsize(float(text.get_fontsize()) * min(share, 1.0))
 

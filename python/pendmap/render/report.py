@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 import matplotlib as mpl
 
 from pendmap.errors import InputError
-from pendmap.files import whole_file, whole_folder
+from pendmap.files import whole_file
 from pendmap.render import drawing, style
 
 if TYPE_CHECKING:
@@ -41,12 +41,12 @@ def write_report(result: Discrepancy, path: str | os.PathLike[str]) -> Path:
         Result of ``pendmap.diagnosis.diagnose``.
     path : str or path
         ``.html``: one file with the figures in it. ``.md``: Markdown, with the figures as ``.png``
-        beside it. Without a suffix: a folder with both, ``report.html`` and ``report.md``.
+        beside it.
 
     Returns
     -------
     Path
-        The file or folder. Each file is complete; existing ones are replaced.
+        The file. Each file is complete; existing ones are replaced.
 
     Raises
     ------
@@ -58,11 +58,10 @@ def write_report(result: Discrepancy, path: str | os.PathLike[str]) -> Path:
     from pendmap import report  # noqa: PLC0415 (likewise)
 
     target = Path(path)
-    suffix = "" if target.is_dir() else target.suffix.lower()
-    if suffix not in {"", *SUFFIXES}:
+    suffix = target.suffix.lower()
+    if suffix not in SUFFIXES:
         raise InputError(
-            f"cannot write {str(target)!r}: suffix must be {' or '.join(SUFFIXES)}, or it must be "
-            f"a folder, got {target.suffix!r}"
+            f"cannot write {str(target)!r}: suffix must be {' or '.join(SUFFIXES)}, got {suffix!r}"
         )
     pictures: dict[str, bytes] = {}
     with style.DRAWING, mpl.rc_context(style.RC):
@@ -70,23 +69,15 @@ def write_report(result: Discrepancy, path: str | os.PathLike[str]) -> Path:
             buffer = io.BytesIO()
             figure.savefig(buffer, format="png", dpi=DPI)
             pictures[name] = buffer.getvalue()
-    folder = contextlib.nullcontext(target.parent if suffix else target)
-    with folder if suffix or target.is_dir() else whole_folder(target) as place:
-        if not suffix:
-            place.mkdir(exist_ok=True)
-        files = {}
-        if suffix != ".html":
-            prefix = f"{target.stem}_" if suffix else ""
-            names = {name: f"{prefix}{name}.png" for name in pictures}
-            files = {names[name]: content for name, content in pictures.items()}
-            page = report.as_markdown(result, names).encode()
-            files[target.name if suffix else "report.md"] = page
-        if suffix != ".md":
-            page = report.as_html(result, pictures).encode()
-            files[target.name if suffix else "report.html"] = page
-        # All of them, or none.
-        with contextlib.ExitStack() as places:
-            for name, content in files.items():
-                part = places.enter_context(whole_file(place / name, (*SUFFIXES, ".png")))
-                part.write_bytes(content)
+    if suffix == ".html":
+        files = {target.name: report.as_html(result, pictures).encode()}
+    else:
+        names = {name: f"{target.stem}_{name}.png" for name in pictures}
+        files = {names[name]: content for name, content in pictures.items()}
+        files[target.name] = report.as_markdown(result, names).encode()
+    # All of them, or none.
+    with contextlib.ExitStack() as places:
+        for name, content in files.items():
+            part = places.enter_context(whole_file(target.parent / name, (*SUFFIXES, ".png")))
+            part.write_bytes(content)
     return target

@@ -54,18 +54,7 @@ def record(
 ) -> Path:
     """Write the recording of a result, with the layout in which the viewer shows it.
 
-    A recording has every panel of the result's chart, marks under ``/PANEL/data``, their names and
-    colours in ``/legend``, and ``/summary``. Basin map: ``/basin/data/{labels,attractors}``,
-    ``/settle/data/steps``, ``/turns/data/turns``, ``/exponent/data/exponent``. Sweep: the basins of
-    each model on the timeline of the parameter (of two: ``map``), and its chart. Map over two
-    parameters: ``/kinds/data/kinds``, ``/{exponent,attractors,undecided}/data/values``.
-    Bifurcation diagram: ``/{bifurcation,velocity,exponent}/data/NUMBER``. Trajectory:
-    ``/state/{theta,omega,energy}``, ``/pendulum/data/{arm,bob,pivot,trail}``,
-    ``/phase/data/{curve,now}``, ``/poincare/data/points``, on the timelines ``sim_time``
-    (nondimensional time, shown as seconds) and ``period``. Identification and diagnosis, of each
-    run, on the record's own seconds: ``/run_1/angle/{record,model}``,
-    ``/run_1/residual/{residual,above,below}`` (mrad) and moving pendulums in
-    ``/run_1/pendulum/data``; a diagnosis has the models ``before`` and ``after``.
+    It has every panel of the result's chart; what moves in time is in docs/files.md.
     """
     if isinstance(result, xr.Dataset):
         made = chart.contents(registry.ready(result, "record"))

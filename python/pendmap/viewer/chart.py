@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import rerun.blueprint as rrb
 
-from pendmap.analysis.sweep_table import varied_names
-from pendmap.charts import basin_sweep, palette, registry
 from pendmap.charts import marks as charts
+from pendmap.charts import palette, registry
 from pendmap.charts.chart import Sheet
 from pendmap.files import facts
 from pendmap.viewer import marks, recording, trajectory
@@ -27,7 +26,6 @@ if TYPE_CHECKING:
     from pendmap.charts.chart import Chart
     from pendmap.charts.marks import Mark
 
-MODELS: Final = "map"  # Timeline of a sweep over two parameters: models row by row
 _OF_A_RUN: Final = ("seconds", "summary", "history")  # Facts that differ between equal results
 CELLS: Final = 4096
 """Most rows and columns of an image; not all graphics processors take larger ones."""
@@ -126,44 +124,8 @@ def contents(dataset: xr.Dataset) -> dict[str, Any]:
         layout = trajectory.layout(known, around)
         return made | {"layout": layout, "log": functools.partial(trajectory.log, dataset=dataset)}
     drawn = drawings(registry.build(dataset, cells=CELLS))
-    front: list[rrb.View | rrb.Container] = [drawn[0].container]
-    line = recording.TIMELINE
-    if kind == "basin_sweep":
-        _, panel, ratio = next(basin_sweep.models(dataset, CELLS))
-        front, dims = [Place.of(panel, ratio).view(), *front], varied_names(dataset)
-        line = dims[0] if len(dims) == 1 else MODELS
-
-    def write(stream: rr.RecordingStream) -> None:
-        lines = str(attrs.get("summary", "")).splitlines()
-        log(stream, drawn, "\n\n".join(lines))
-        if kind == "basin_sweep":
-            _log_models(stream, dataset, line, drawn[0].places)
-
-    shares = [*([6] * len(front)), 5]
+    text = "\n\n".join(str(attrs.get("summary", "")).splitlines())
     return made | {
-        "layout": recording.screen(*front, ASIDE, shares=shares, timeline=line),
-        "log": write,
+        "layout": recording.screen(drawn[0].container, ASIDE, shares=[6, 5]),
+        "log": functools.partial(log, drawn=drawn, summary=text),
     }
-
-
-def _log_models(
-    stream: rr.RecordingStream, dataset: xr.Dataset, line: str, others: Sequence[Place]
-) -> None:
-    """Log the basins of each model of a sweep on the timeline of its parameter.
-
-    The value of one parameter is in seconds, and a line in the other panels.
-    """
-    for number, (at, panel, ratio) in enumerate(basin_sweep.models(dataset, CELLS)):
-        place = Place.of(panel, ratio)
-        if number == 0:
-            place.log_frame(stream)
-        if line == MODELS:
-            stream.set_time(line, sequence=number)
-        else:
-            stream.set_time(line, duration=at[0][1])
-            now = charts.Level(at[0][1], axis="x", path="now")
-            for other in others:
-                marks.log(stream, other, now, 0, static=False)
-        for order, mark in enumerate(panel.marks):
-            marks.log(stream, place, mark, order, static=False)
-    stream.reset_time()

@@ -189,21 +189,19 @@ def _values(mark: Mark, which: str) -> Floats:
     return np.concatenate([np.empty(0), *(np.ravel(array) for array in arrays)])
 
 
-def log(
-    stream: rr.RecordingStream, place: Place, mark: Mark, number: int, *, static: bool = True
-) -> None:
+def log(stream: rr.RecordingStream, place: Place, mark: Mark, number: int) -> None:
     """Log a mark under its path, or else its number and name; it covers those before it."""
     leaf = re.sub(r"\W+", "_", f"{number}_{mark.name}").strip("_")
     path = f"{place.root}/data/{mark.path or leaf}"
     order = 0.01 * number if mark.order is None else mark.order
     if isinstance(mark, charts.Image):
-        _log_image(stream, place, mark, path, static=static)
+        _log_image(stream, place, mark, path)
     elif isinstance(mark, charts.Points):
         for leaf, points in _points(mark, place, POINTS + order):
-            stream.log(f"{path}{leaf}", points, static=static)
+            stream.log(f"{path}{leaf}", points, static=True)
     elif isinstance(mark, charts.Text):
         at = place.points([mark.x], mark.y)
-        stream.log(path, recording.labels(at, [mark.text], _shade(mark.colour)), static=static)
+        stream.log(path, recording.labels(at, [mark.text], _shade(mark.colour)), static=True)
     elif not isinstance(mark, charts.Line) or np.size(mark.x) or mark.path:
         above = LINES if isinstance(mark, charts.Line | charts.Steps | charts.Level) else AREAS
         lines = place.lines(*_outlines(mark, place))
@@ -212,7 +210,7 @@ def log(
         if mark.name and lines:  # shown where one points
             look |= {"labels": [mark.name] * len(lines), "show_labels": False}
         strips = [line.astype(np.float32) for line in lines]
-        stream.log(path, rr.LineStrips2D(strips, **look), static=static)
+        stream.log(path, rr.LineStrips2D(strips, **look), static=True)
 
 
 def legend(every: Sequence[Mark]) -> dict[str, str]:
@@ -274,9 +272,7 @@ def _points(mark: charts.Points, place: Place, order: float) -> Iterator[tuple[s
             yield leaf, rr.Points2D(at, radii=rr.Radius.ui_points(radius), **look)
 
 
-def _log_image(
-    stream: rr.RecordingStream, place: Place, mark: charts.Image, path: str, *, static: bool
-) -> None:
+def _log_image(stream: rr.RecordingStream, place: Place, mark: charts.Image, path: str) -> None:
     """Log an image of classes; where one points, the viewer shows the name of the class."""
     shown, classes, look = mark.values, list(mark.classes), mark.colours
     if look is not None:
@@ -292,7 +288,7 @@ def _log_image(
     order = images.index(mark) * 0.01
     image: Any = shown.astype(kind)
     image = rr.SegmentationImage(image, opacity=1.0, draw_order=order)
-    stream.log(path, image, static=static)
+    stream.log(path, image, static=True)
 
 
 def _in_classes(

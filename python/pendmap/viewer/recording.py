@@ -97,16 +97,13 @@ def text(stream: rr.RecordingStream, path: str, markdown: str) -> None:
     stream.log(path, rr.TextDocument(markdown, media_type="text/markdown"), static=True)
 
 
-def screen(
-    *views: rrb.View | rrb.Container, shares: Sequence[float], timeline: str = TIMELINE
-) -> rrb.Blueprint:
+def screen(*views: rrb.View | rrb.Container, shares: Sequence[float]) -> rrb.Blueprint:
     """Return the layout of a window: these views side by side, without automatic ones."""
-    moves = timeline != TIMELINE
     return rrb.Blueprint(
         rrb.Horizontal(*views, column_shares=list(shares)),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
-        rrb.TimePanel(state="expanded" if moves else "collapsed", timeline=timeline),
+        rrb.TimePanel(state="collapsed", timeline=TIMELINE),
         auto_layout=False,
         auto_views=False,
     )

@@ -11,7 +11,6 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from pendmap.charts import names, palette, registry
-from pendmap.charts.identification import simulated
 from pendmap.charts.palette import look
 from pendmap.comparison import Comparison
 from pendmap.comparison.experiment import in_short
@@ -25,7 +24,7 @@ from pendmap.viewer.marks import plain
 from pendmap.viewer.recording import INK, Look
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Sequence
 
     from pendmap.charts.marks import Floats
     from pendmap.identification.fit import TrajectoryFit
@@ -47,27 +46,14 @@ APART: Final = 2.5  # Distance between two pivots, arm lengths
 class Motion:
     """A record and its models, in s and rad; a row of NaN marks a gap.
 
-    ``models`` have a look, times and angles; the times are those of the record if the model was
-    fitted to it. ``sigma`` is the noise of a reading, 0 if unknown.
+    ``models`` have a look and angles; ``sigma`` is the noise of a reading.
     """
 
     name: str
     time: Floats
     record: Floats
-    models: Sequence[tuple[Look, Floats, Floats]]
+    models: Sequence[tuple[Look, Floats]]
     sigma: float
-
-    def residuals(self) -> Iterator[tuple[Look, Floats]]:
-        """Yield record less model of each fitted model."""
-        for shade, time, theta in self.models:
-            if time is self.time and np.isfinite(theta).any():
-                yield shade, self.record - theta
-
-    @property
-    def rms(self) -> float:
-        """Largest root mean square residual of the models, rad."""
-        squares = (float(np.nanmean(residual**2)) for _, residual in self.residuals())
-        return math.sqrt(max(squares, default=0.0))
 
 
 def contents(result: Any) -> dict[str, Any]:  # noqa: ANN401 (of several types)
@@ -83,7 +69,7 @@ def contents(result: Any) -> dict[str, Any]:  # noqa: ANN401 (of several types)
         for number, one in enumerate(every, 1):
             log(stream, f"run_{number}", one)
 
-    arrays = (v for one in every for v in (one.time, one.record, *(m[2] for m in one.models)))
+    arrays = (v for one in every for v in (one.time, one.record, *(m[1] for m in one.models)))
     return {
         "name": plain(shown.title),
         "content": recording.content_of([shown.title, text, *arrays]),
@@ -113,16 +99,10 @@ def summary(result: Any) -> str:  # noqa: ANN401 (of several types)
 
 
 def of_identification(report: IdentificationReport) -> list[Motion]:
-    """Return every fitted run, or else the record with the best method's simulation."""
-    joint, run, best = report.joint, report.run, report.sound
+    """Return every run to which a trajectory was fitted."""
+    made, joint = [], report.joint
     if joint is None:
-        decay = None if best is None else simulated(report).get(best.method)
-        models = [] if decay is None else [(_look("model"), decay.time, decay.theta)]
-        time, theta = run.time, run.theta
-        if run.peaks_only:
-            time, theta = report.peaks.time, report.peaks.amplitude
-        return [Motion(run.name, time, theta, models, report.peaks.sigma)]
-    made = []
+        return []
     for k, (one, reading) in enumerate(zip(joint.runs, joint.readings, strict=True)):
         angle, residual = joint.fit.curves[k][0], joint.fit.residuals[k]
         # Errors of a sensor on the rod do not apply to the angle.
@@ -179,7 +159,7 @@ def _thinned(
         np.insert(column[::every], cuts, math.nan)
         for column in (run.theta, *(theta for _, theta in angles))
     )
-    drawn = [(shade, time, theta) for (shade, _), theta in zip(angles, models, strict=True)]
+    drawn = [(shade, theta) for (shade, _), theta in zip(angles, models, strict=True)]
     return Motion(run.name, time, record, drawn, sigma)
 
 
@@ -192,16 +172,14 @@ def container(root: str, one: Motion) -> rrb.Container:
         name=f"{who[:1].upper()}{who[1:]}",
         visual_bounds=rrb.VisualBounds2D(x_range=wide, y_range=[-1.15, 1.5]),
     )
-    named = [("angle", f"{names.ANGLE}, {one.name}")]
-    if one.rms:
-        named.append(("residual", "Record less model (mrad)"))
+    named = {"angle": f"{names.ANGLE}, {one.name}", "residual": "Record less model (mrad)"}
     # A decay leaves this corner free.
     corner = rrb.Corner2D.RightTop
     below = [
         rrb.TimeSeriesView(origin=f"/{root}/{leaf}", name=name, plot_legend=corner)
-        for leaf, name in named
+        for leaf, name in named.items()
     ]
-    return rrb.Vertical(pendulums, *below, row_shares=[5, 3, 4][: 1 + len(below)], name=one.name)
+    return rrb.Vertical(pendulums, *below, row_shares=[5, 3, 4], name=one.name)
 
 
 def log(stream: rr.RecordingStream, root: str, one: Motion) -> None:
@@ -215,19 +193,18 @@ def log(stream: rr.RecordingStream, root: str, one: Motion) -> None:
     words = ["record", *(shade.name for shade, *_ in one.models)]
     named = recording.labels([[x, 1.2] for x in pivots], words)
     stream.log(f"{path}/axes/names", named, static=True)
-    _pendulum(stream, f"{path}/data/record", (one.time, one.record), RECORD, 0.0)
-    for pivot, (shade, time, theta) in zip(pivots[1:], one.models, strict=True):
+    record = one.time, one.record
+    _pendulum(stream, f"{path}/data/record", record, RECORD, 0.0)
+    for pivot, (shade, theta) in zip(pivots[1:], one.models, strict=True):
         leaf = f"{path}/data/{shade.name}"
-        recording.series(stream, f"{root}/angle/{shade.name}", time, theta, shade)
-        _pendulum(stream, f"{leaf}/record", (one.time, one.record), RECORD, pivot)
-        _pendulum(stream, leaf, (time, theta), shade, pivot)
-    for shade, residual in one.residuals():
+        recording.series(stream, f"{root}/angle/{shade.name}", one.time, theta, shade)
+        _pendulum(stream, f"{leaf}/record", record, RECORD, pivot)
+        _pendulum(stream, leaf, (one.time, theta), shade, pivot)
+        residual = one.record - theta
         rms = MILLI * math.sqrt(float(np.nanmean(residual**2)))
         leaf = shade.name if len(one.models) > 1 else "residual"
         named_look = replace(shade, size=1.2, name=f"{shade.name}, {rms:.3g} mrad rms")
         recording.series(stream, f"{root}/residual/{leaf}", one.time, MILLI * residual, named_look)
-    if not (one.rms and one.sigma):
-        return
     size = MILLI * BAND * one.sigma
     for leaf, sign, mark in (("above", 1.0, "+"), ("below", -1.0, MINUS)):
         name = f"{mark}{BAND:g} σ of the noise, {mark}{size:.3g} mrad"

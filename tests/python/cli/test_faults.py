@@ -92,13 +92,6 @@ def test_a_command_that_asks_for_too_much_memory_is_refused(
         assert not list(tmp_path.iterdir())
 
 
-def test_free_space_is_checked_before_the_computation(tmp_path: Path) -> None:
-    with pytest.raises(OSError, match="are needed"):
-        check_room(tmp_path / "m.nc", 10**18)
-    check_room(tmp_path / "m.nc", 10)
-    assert list(tmp_path.iterdir()) == []
-
-
 def without(modules: str, folder: Path) -> dict[str, str]:
     """Return the environment of a Python that lacks modules."""
     hide = f"import sys\nsys.modules |= dict.fromkeys({modules.split()})\n"

@@ -1,15 +1,16 @@
-"""Commands and snippets of README.md and of the pages in docs are run."""
+"""Commands, snippets and links of README.md and of the pages in docs; the built site."""
 
 from __future__ import annotations
 
 import importlib.util
-import os
 import re
 import shlex
 import subprocess
 import sys
+from html.parser import HTMLParser
 from pathlib import Path
 from typing import TYPE_CHECKING
+from urllib.parse import unquote, urlsplit
 
 import pytest
 
@@ -27,8 +28,6 @@ outputs = importlib.util.module_from_spec(SPEC)
 SPEC.loader.exec_module(outputs)
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 RAW = "https://raw.githubusercontent.com/pendmap/pendmap/main/"
-PATIENCE = 120.0
-"""Upper bound on the processor time of a command, s."""
 OWN_TESTS = {"cells.md", "gallery.md"}
 """Pages whose snippets tests of their own run, in a folder with records."""
 GENERATED = {"_build", "effects", "commands.md", "results.md"}
@@ -85,12 +84,6 @@ def needed(place: int, lines: list[list[str]]) -> list[int]:
     return sorted({k for k in map(last.get, names) if k is not None})
 
 
-def children_seconds() -> float:
-    """Return the processor time, s, of all ended child processes."""
-    spent = os.times()
-    return spent.children_user + spent.children_system
-
-
 def together(lines: list[list[str]]) -> list[list[int]]:
     """Return the groups of dependent commands as indices in order, each command once."""
     groups: list[set[int]] = []
@@ -115,15 +108,8 @@ def together(lines: list[list[str]]) -> list[list[int]]:
 )
 def test_every_command_runs(page: Path, places: list[int], tmp_path: Path) -> None:
     for words in (PROMISED[page][place] for place in places):
-        began = children_seconds()
         finished = run_command(tmp_path, *words[1:])
         assert finished.returncode == 0, f"{words}: {finished.stderr}"
-        assert children_seconds() - began < PATIENCE
-
-
-def test_the_pages_contain_commands() -> None:
-    for name, least in {"README.md": 2, "basins.md": 7, "diagnose.md": 5}.items():
-        assert any(page.name == name and len(PROMISED[page]) >= least for page in PAGES)
 
 
 def test_make_knows_the_other_commands() -> None:
@@ -131,12 +117,7 @@ def test_make_knows_the_other_commands() -> None:
     assert ["make", "demo"] in others
     assert ["make", "test"] in others
     for words in others:
-        run = subprocess.run(
-            [*words, "--dry-run"], cwd=ROOT, capture_output=True, text=True, check=False
-        )
-        assert run.returncode == 0, run.stderr
-        if words[1] == "demo":
-            assert "pendmap basins --p 1.7" in run.stdout
+        subprocess.run([*words, "--dry-run"], cwd=ROOT, capture_output=True, check=True)
 
 
 @pytest.mark.parametrize("code", SNIPPETS)
@@ -197,3 +178,56 @@ def test_every_output_is_what_is_printed(page: Path) -> None:
 
 def test_the_readme_is_short() -> None:
     assert len(README.splitlines()) <= 150
+
+
+class Page(HTMLParser):
+    """Anchors, links and loaded files of a page."""
+
+    def __init__(self, path: Path) -> None:
+        """Read a page."""
+        super().__init__()
+        self.anchors: set[str] = set()
+        self.links: list[str] = []
+        self.loaded: list[str] = []
+        self.feed(path.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """Note what a tag refers to."""
+        given = {name: value for name, value in attrs if value is not None}
+        self.anchors.update(given[name] for name in ("id", "name") if name in given)
+        if tag == "a" and "href" in given:
+            self.links.append(given["href"])
+        elif tag in {"img", "script", "iframe", "source"} and "src" in given:
+            self.loaded.append(given["src"])
+        elif tag == "link" and "href" in given:
+            self.loaded.append(given["href"])
+
+
+@pytest.mark.manual
+def test_the_site_builds_and_every_link_has_a_target(tmp_path: Path) -> None:
+    pytest.importorskip("sphinx", reason="the extra docs is not installed")
+    site = tmp_path / "site"
+    words = ["-m", "sphinx", "-W", "--keep-going", "-n", "-q", "docs", str(site)]
+    run = subprocess.run(
+        [sys.executable, *words], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert run.returncode == 0, run.stderr
+    assert not run.stderr
+    pages = {path: Page(path) for path in site.rglob("*.html")}
+    assert len(pages) > 60
+    broken = []
+    for path, page in pages.items():
+        for target in [*page.links, *page.loaded]:
+            parts = urlsplit(target)
+            if parts.scheme or parts.netloc:
+                if target in page.loaded:
+                    broken.append(f"{path.name} loads {target}")
+                continue
+            aim = (path.parent / unquote(parts.path)).resolve() if parts.path else path
+            if not aim.exists():
+                broken.append(f"{path.name}: {target}")
+            elif parts.fragment and aim in pages:
+                anchor = unquote(parts.fragment)
+                if anchor not in pages[aim].anchors and anchor != "top":
+                    broken.append(f"{path.name}: {target}")
+    assert not broken, broken
