@@ -43,11 +43,7 @@ def disc(side: int, seed: int) -> Labels:
 
 
 def cantor(side: int, seed: int, ratio: float) -> Labels:
-    """Return labels of a Cantor set's gaps, by generation, times an interval.
-
-    Each of the two parts has ``ratio`` of the length of the whole: dimension ``1 + ln 2 / ln
-    (1/ratio)``.
-    """
+    """Return labels of a Cantor set's gaps times an interval: dimension 1 + ln 2 / ln(1/ratio)."""
     rng = np.random.default_rng(seed)
     u = (centres(side)[0] + rng.uniform(0.1, 0.4)) / rng.uniform(1.5, 2.0)
     label, inside = np.ones(u.shape, dtype=np.int64), np.ones(u.shape, dtype=bool)

@@ -81,8 +81,9 @@ def test_friction_opposes_the_motion_in_all_units() -> None:
     pushed = pendmap.simulate(Pendulum(torque=-0.05), 0, 7, 5, tol=1e-12)
     assert (rubbing.velocity.values > 0).all()
     assert rubbing.theta.values == pytest.approx(pushed.theta.values, abs=1e-12)
-    si = pendmap.simulate(SWING, 2.0, 3.0, 60.0)
-    bare = pendmap.simulate(SWING.pendulum, 2.0, 3.0 / 6.2, 60.0 * 6.2)
+    rig = Rig(w0=6.2, c_over_m=0.05, Tr=8.0, p=1.5, Omega=12.0)
+    si = pendmap.simulate(rig, 2.0, 3.0, 5.0)
+    bare = pendmap.simulate(rig.pendulum, 2.0, 3.0 / 6.2, 5.0 * 6.2)
     assert si.event_kind.values.tolist() == bare.event_kind.values.tolist()
     assert {"turn", "stick", "release"} <= {*si.event_kind.values.tolist()}
     assert 6.2 * si.event_time.values == pytest.approx(bare.event_time.values)
