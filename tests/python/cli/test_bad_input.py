@@ -152,7 +152,7 @@ FILES: Final[dict[str, Callable[[Path], object]]] = {
         *((f"simulate --model deep{k}.toml", "keys must have at most 20 parts") for k in "123"),
         ("simulate --model flat.toml", "is not known"),
         ("look wide.csv", "got no rows"),
-        ("look wider.csv", "got lines of more"),
+        ("look wider.csv", "got no rows of numbers"),
         ("look unpacked.parquet", "unpacks to 1221 MiB"),
         ("plot unpacked.nc", "must unpack to half of this memory at most, got"),
     ],

@@ -132,7 +132,7 @@ def test_an_identification_is_drawn_in_any_size_and_by_each_part() -> None:
     with pytest.raises(InputError, match="must be among record, decrement"):
         identification.sheet(report, parts=("decays",))
     for shape in (None, (9.0, 5.6), (5.6, 8.0)):
-        drawn(pendulum.chart(shape), size=shape)
+        drawn(pendulum.chart(), size=shape)
 
 
 def test_a_comparison_of_many_runs_fits_a_screen() -> None:
