@@ -125,12 +125,13 @@ def run() -> None:
         warnings.simplefilter("ignore")  # warnings of libraries are for developers
     os.environ["MPLBACKEND"] = "agg"  # figures are written to files, without windows
     stops: list[int] = []
+    code = 0
     try:
         with _stoppable(stops):
             code = _exit_code(stops)
     except KeyboardInterrupt:
-        # The interrupt came before the handlers were set, or after they were removed.
-        code = INTERRUPTED if stops else _interrupted()
+        # The interrupt came while the handlers were set, or removed.
+        code = code if code == INTERRUPTED else _interrupted()
     if stops and code == INTERRUPTED:
         # A library that was interrupted, for example during its import, may crash when the
         # interpreter shuts down.

@@ -151,6 +151,7 @@ def load(path: str | os.PathLike[str]) -> Any:
             _check_whole(source)
             dataset = _loaded(xr.open_zarr(source, chunks=None, zarr_format=3, **form), source)
         else:
+            _check_alone(source)
             with _ONE, xr.open_dataset(source, engine="netcdf4", **form) as opened:
                 dataset = _loaded(opened, source)
         if "content" not in dataset.attrs:
@@ -161,6 +162,21 @@ def load(path: str | os.PathLike[str]) -> Any:
         raise
     except Exception as error:  # a damaged file may raise any error
         raise InputError(f"{source}: cannot be read as a result of pendmap: {error}") from error
+
+
+def _check_alone(path: Path) -> None:
+    """Raise InputError if a NetCDF file refers to other files, which the library would open."""
+    import h5py  # noqa: PLC0415 (loading alone needs it)
+
+    if not h5py.is_hdf5(path):  # the classic format has one file
+        return
+    with h5py.File(path) as file:
+        for name in file:
+            hard = isinstance(file.get(name, getlink=True), h5py.HardLink)
+            if not hard or not isinstance(file[name], h5py.Dataset):
+                raise InputError(f"{path}: {name} must be in this file, got a link or a group")
+            if file[name].external or file[name].is_virtual:
+                raise InputError(f"{path}: {name} must be in this file, got values in another")
 
 
 def _loaded(dataset: xr.Dataset, source: Path) -> xr.Dataset:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import hashlib
 import importlib
 import json
+import os
 import re
 import tomllib
 from typing import TYPE_CHECKING, Any
 
+import h5py
 import numpy as np
 import pytest
 import xarray as xr
@@ -178,3 +180,23 @@ file = "b"
 def test_written_toml_reads_back(content: dict[str, Any], text: str | None) -> None:
     assert tomllib.loads(toml_text(content)) == content
     assert text in {None, toml_text(content)}
+
+
+@pytest.mark.parametrize("name", ["link", "storage", "virtual", "group"])
+def test_a_netcdf_that_leads_to_another_file_is_not_opened(name: str, tmp_path: Path) -> None:
+    # The other file is a pipe: whoever opens it waits for ever.
+    other = tmp_path / "other"
+    os.mkfifo(other)
+    with h5py.File(tmp_path / "a.nc", "w") as file:
+        if name == "link":
+            file["theta"] = h5py.ExternalLink(other, "theta")
+        elif name == "storage":
+            file.create_dataset("theta", (4,), "f8", external=[(other, 0, 32)])
+        elif name == "virtual":
+            layout = h5py.VirtualLayout((4,), "f8")
+            layout[:] = h5py.VirtualSource(other, "theta", (4,))
+            file.create_virtual_dataset("theta", layout)
+        else:
+            file.create_group("theta")
+    with pytest.raises(InputError, match="theta must be in this file"):
+        pendmap.load(tmp_path / "a.nc")

@@ -186,7 +186,7 @@ def test_a_wrong_unit_is_reported_first(tmp_path: Path, pendmap_command: Run) ->
     # Nothing is searched where no pendulum swings like this.
     run = pendmap_command("identify", "lab")
     assert run.returncode == 2
-    assert re.search("run: swings of 1.. rad .*: the unit or the scale is wrong", run.stderr)
+    assert re.search("run: swings of 154.2 rad .*: the unit or the scale is wrong", run.stderr)
 
 
 def test_a_closed_pipe_is_no_failure(decay_file: Path, tmp_path: Path) -> None:
