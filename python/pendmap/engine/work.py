@@ -156,7 +156,8 @@ class FileStore(Store):
 
     def complete(self, result: xr.Dataset) -> None:
         """Write the result, and remove the records."""
-        dataset.write_store(result, self.path, self._request)
+        # The working folder may have changed since the run began.
+        dataset.write_store(result, self._folder.parents[1] / self.path.name, self._request)
         self._clear()
 
     def _clear(self) -> None:

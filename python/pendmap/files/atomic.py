@@ -153,9 +153,8 @@ def _stage(target: Path) -> Iterator[Path]:
             stage = new.rename(new.with_name(new.name.replace("_", "-", 1)))
             try:
                 yield stage
-            except (
-                Exception
-            ) as error:  # the disk's own error is raised in place of an unspecific one
+            except Exception as error:
+                # The disk's own error is raised in place of an unspecific one.
                 if not isinstance(error, InputError | MemoryError | OSError):
                     (stage / "probe").write_bytes(bytes(_PROBE))
                 raise

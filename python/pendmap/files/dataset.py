@@ -172,11 +172,10 @@ def _check_alone(path: Path) -> None:
         return
     with h5py.File(path) as file:
         for name in file:
-            hard = isinstance(file.get(name, getlink=True), h5py.HardLink)
-            if not hard or not isinstance(file[name], h5py.Dataset):
-                raise InputError(f"{path}: {name} must be in this file, got a link or a group")
-            if file[name].external or file[name].is_virtual:
-                raise InputError(f"{path}: {name} must be in this file, got values in another")
+            linked = not isinstance(file.get(name, getlink=True), h5py.HardLink)
+            one = None if linked else file[name]
+            if not isinstance(one, h5py.Dataset) or one.external or one.is_virtual:
+                raise InputError(f"{path}: {name} must be in this file, without a link or a group")
 
 
 def _loaded(dataset: xr.Dataset, source: Path) -> xr.Dataset:
