@@ -1,6 +1,7 @@
 """The page of results: variables, dimensions, units and meanings, from a small result of each kind.
 
-Variables are those of the dataset; attributes and keys of the JSON object those of the schema.
+Variables are those of the dataset; attributes and keys of the JSON object those of the schema, of
+commands on records those of their table of keys.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import numpy as np
 
 import pendmap
 from pendmap import Pendulum, Rig, Run
+from pendmap.report.json_keys import KEYS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -20,12 +22,18 @@ if TYPE_CHECKING:
     import xarray as xr
 
 HERE = Path(__file__).resolve().parents[1]
-INTRODUCTION = """# Variables of results
+INTRODUCTION = """# Variables and keys of results
 
 Each result is a dataset by the CF conventions ([files](files.md)): `pendmap.load` returns it,
 `dataset.pendmap.to_dataframe()` a table. A variable without dimensions is one number or text. The
 last column says what is in the object that `--json` prints. What stands here are results of small
 examples; models with effects, `draws=` and further options add variables.
+
+Of commands on records ([look](#look), [identify](#identify), [compare](#compare),
+[diagnose](#diagnose)) the keys of `--json` have a table of their own. `runs[].rms` is the key `rms`
+of an item of the list `runs`; a part in capitals stands for names of parameters, effects, methods;
+a key without a value is null. Booleans have the unit "no or yes", numbers without dimension 1, and
+parameters the SI unit that [effects](effects/index.md) and [models](maps/models.md) state.
 """
 RIG = Rig(w0=6.2, c_over_m=0.05, Tr=0.08)
 BARE = Pendulum(p=0.6)
@@ -91,9 +99,13 @@ def page() -> str:
         command, *_ = pendmap.ANALYSES[kind]
         parts += [f"## {command}\n", table(head, [*variables(dataset, keys)])]
         parts.append(table(["attribute or key", *head[2:]], attributes))
-    for command, make in RECORDS.items():
-        rows = [row[:-1] for row in variables(make().to_dataset(), frozenset())]
-        parts += [f"## {command}\n", table(head[:-1], rows)]
+    for command, keys_of in KEYS.items():
+        parts.append(f"## {command}\n")
+        if command in RECORDS:
+            dataset = RECORDS[command]().to_dataset()
+            parts.append(table(head[:-1], [row[:-1] for row in variables(dataset, frozenset())]))
+        rows = [[f"`{k.replace(', ', '`, `')}`", *about] for k, about in keys_of.items()]
+        parts.append(table(["key of the JSON", *head[2:-1]], rows))
     return "\n".join(parts)
 
 
