@@ -72,8 +72,10 @@ def program(folder: Path, *words: str) -> Iterator[tuple[str, subprocess.Popen[b
         process.wait(timeout=20)
 
 
-def ended(process: subprocess.Popen[bytes]) -> None:
-    time.sleep(1.0)  # time for data in transit to arrive
+def ended(process: subprocess.Popen[bytes], file: Path) -> None:
+    size = -1
+    while size != (size := file.stat().st_size):  # until data in transit have arrived
+        time.sleep(1.0)
     process.send_signal(signal.SIGINT)
     process.wait(timeout=30)
 
@@ -89,7 +91,7 @@ def test_the_sent_data_are_the_trajectory(tmp_path: Path) -> None:
 
         run = pendmap.simulate(PENDULUM, 1.0, 0.0, 600.0, live=in_blocks)
         live.finish(run)
-        ended(process)
+        ended(process, file)
     sent, plain = ReadBack(file), recorded(run, tmp_path)
     assert run.sizes["time"] > 3000
     for entity, component in (
@@ -124,7 +126,7 @@ def test_ctrl_c_ends_it_with_what_was_computed(tmp_path: Path) -> None:
         assert run.returncode == 130, err
         assert "interrupted, a.nc written" in err
         assert "INTERRUPTED before tau = 3e+06" in out
-        ended(process)
+        ended(process, file)
     kept = pendmap.load(tmp_path / "a.nc")
     assert kept.attrs["interrupted"] == 1
     assert 1000 < kept.sizes["time"] < 3e6
