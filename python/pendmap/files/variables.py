@@ -25,9 +25,8 @@ CONVENTIONS: Final = "CF-1.11"
 FORMAT_VERSION: Final = 3  # Version of the layout, in the attribute ``format_version``
 MARKS: Final = frozenset(("format_version", "kind"))  # Attributes that mark a dataset as a result
 NO_YES: Final = {0: "no", 1: "yes"}  # Meanings of a flag
-_TEXT: Final = (
-    "_name"  # Suffix of coordinates of text in files: by CF those of a dimension are numbers
-)
+_TEXT: Final = "_name"
+"""Suffix of coordinates of text in files: by CF the coordinate of a dimension has numbers."""
 _UDUNITS: Final = re.compile(r"(1|rad|m|mm|s|Hz)(/(rad|s)\d?)?")  # Units that UDUNITS-2 has too
 _ROWS: Final = {"bifurcation": "entry", "lifetime": "start", "tongues": "critical"}
 """Dimension of the rows of a table, where it is not that of the first variable."""
