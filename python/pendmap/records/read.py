@@ -15,9 +15,10 @@ from pendmap.records.across import checked_together
 from pendmap.records.channels import channels_of
 from pendmap.records.description import NAME, RATES, Description, RunPlan, checked, read_description
 from pendmap.records.experiment import Experiment, Finding, Run, finding_of
+from pendmap.records.formats import TABLES, read_table
 from pendmap.records.rod_sensors import gyroscope_of
 from pendmap.records.rules import OF_RELEASE, RULES, apply
-from pendmap.records.tables import is_frame, read_table, table_of
+from pendmap.records.tables import is_frame, table_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,8 +28,6 @@ if TYPE_CHECKING:
 
     Records: TypeAlias = Experiment | Run | pd.DataFrame | str | os.PathLike[str]
 
-# Suffixes of the files that are records in a folder without a description
-TABLES: Final = (".csv", ".tsv", ".txt", ".dat", ".parquet", ".pq", ".xlsx")
 _FORMS: Final = (
     "paths, DataFrames with columns like t_s and theta_rad, an Experiment like"
     " pendmap.read_experiment('folder'), Runs or a list of them"

@@ -1,12 +1,10 @@
-"""Reading of tables from files: text in the formats of common loggers, Excel, Parquet."""
+"""Tables of numbers, from text in the formats of common loggers and from DataFrames."""
 
 from __future__ import annotations
 
 import csv
 import dataclasses
 import datetime as dt
-import hashlib
-import io
 import re
 from collections import Counter
 from typing import TYPE_CHECKING, Final
@@ -14,15 +12,11 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.errors import InputError
-from pendmap.files import read_whole
 from pendmap.formatting import counted, listed
 from pendmap.records.experiment import finding_of
 from pendmap.records.units import CHANNELS
-from pendmap.records.workbooks import WORKBOOK, sheet_text
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     import pandas as pd
 
     from pendmap.records.description import Reader
@@ -61,14 +55,6 @@ LARGEST_READING: Final = 1e18  # Largest reading; larger ones (2e18: ns since 19
 _DATE: Final = re.compile(
     r'\s*"?(\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d(?:([.,])\d+)?(?:Z|[+-]\d\d:?\d\d)?)"?(?=\s*[,;|\t])'
 )
-_KNOWN: Final = {
-    b"\x1f\x8b": "must be unpacked, it is compressed",
-    b"\x89HDF": "must be CSV or Parquet, it is an HDF5 file",
-    b"CDF\x01": "must be CSV or Parquet, it is a NetCDF file",
-    b"%PDF": "must be CSV or Parquet, it is a PDF file",
-    b"\xd0\xcf\x11\xe0": "must be .xlsx or CSV, it is an Excel file of an old version",
-    b"MATLAB 5.0": "must be CSV or Parquet, it is a MATLAB file",
-}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -85,55 +71,6 @@ class Table:
     def __post_init__(self) -> None:
         """Mark readings that are infinite or too large as missing."""
         self.values[~(np.abs(self.values) <= LARGEST_READING)] = np.nan
-
-
-def read_table(path: Path, reader: Reader) -> tuple[Table, str]:
-    """Return the numbers of a file and its SHA-256; raise InputError if there are none."""
-    where = str(path)
-    if path.is_dir():
-        raise InputError(f"{where}: must be a file, it is a folder")
-    data = read_whole(path, MOST_BYTES)
-    digest = hashlib.sha256(data).hexdigest()
-    for mark, what in _KNOWN.items():
-        if data.startswith(mark):
-            raise InputError(f"{where}: {what}")
-    if data[:4] == b"PAR1" or path.suffix.lower() in {".parquet", ".pq"}:
-        return _parquet(data, where), digest
-    if data[:4] == WORKBOOK:
-        text, columns, findings = sheet_text(data, where, MOST_BYTES)
-        refuse_large(where, columns=columns)
-        reader = dataclasses.replace(reader, delimiter="\t", decimal=reader.decimal or ".")
-    else:
-        text, findings = decoded(data, where)
-    return parsed(text, reader, where, findings), digest
-
-
-def _parquet(data: bytes, where: str) -> Table:
-    """Return the table of a Parquet file, if its declared size is allowed."""
-    try:
-        import pyarrow as pa
-        from pyarrow import parquet
-
-        # An error of a damaged file in a second thread would crash the process.
-        file = parquet.ParquetFile(io.BytesIO(data), pre_buffer=False)
-        # Sizes are read from the row groups: reading a damaged column's may crash the process.
-        groups = [file.metadata.row_group(k) for k in range(file.metadata.num_row_groups)]
-        size = sum(max(8 * g.num_rows * g.num_columns, g.total_byte_size) for g in groups)
-        refuse_large(where, columns=file.metadata.num_columns, size=size)
-        # Texts and nested columns are unbounded.
-        kind = pa.types
-        is_number = (kind.is_integer, kind.is_floating, kind.is_boolean, kind.is_temporal)
-        names = [f.name for f in file.schema_arrow if any(is_of(f.type) for is_of in is_number)]
-        return table_of(file.read(columns=names, use_threads=False).to_pandas(), where)
-    except InputError:
-        raise
-    except ModuleNotFoundError:
-        raise InputError(
-            f"{where}: a Parquet file needs the extra pendmap[viewer] (pyarrow), or must be saved"
-            " as CSV"
-        ) from None
-    except Exception as error:  # noqa: BLE001 (whatever a damaged file makes of the reader)
-        raise InputError(f"{where}: is no Parquet file that can be read: {error}") from None
 
 
 def is_frame(records: object) -> bool:

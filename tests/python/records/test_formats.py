@@ -18,7 +18,6 @@ import pandas as pd
 import pytest
 
 import pendmap
-from pendmap.records import tables
 from pendmap.records.summary import as_json, as_text, doubts
 from recorded import clean, experiment, found, motion, noisy, read, text
 
@@ -265,7 +264,7 @@ def test_a_small_workbook_does_not_unpack_to_gigabytes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, sheet: str, says: str
 ) -> None:
     monkeypatch.setattr("pendmap.records.workbooks.MOST_CELLS", 1_200_000)
-    monkeypatch.setattr(tables, "MOST_BYTES", 1_000_000)
+    monkeypatch.setattr("pendmap.records.formats.MOST_BYTES", 1_000_000)
     plain, path = workbook(tmp_path, {"data": [[1.0]]}), tmp_path / "bomb.xlsx"
     with zipfile.ZipFile(plain) as packed, zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as bomb:
         for part in packed.namelist():
