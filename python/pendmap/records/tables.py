@@ -28,25 +28,6 @@ if TYPE_CHECKING:
 MOST_BYTES: Final = 2**30  # Largest file, and largest table in memory, bytes
 MOST_CONTROLS: Final = 0.02  # Share of control characters above which a file is no text
 MOST_NULS: Final = 0.2  # Share of NUL bytes above which a file is no text
-_CONTROLS: Final = 0.02  # Share of control characters above which a file is no text
-MOST_NULS: Final = 0.2  # Share of NUL bytes above which a file is no text
-# Separators with decimal signs, in the order of preference
-SEPARATORS: Final = (
-    *((";", ","), ("\t", ","), ("\t", "."), (";", "."), (",", ".")),
-    *(("|", "."), (" ", "."), (" ", ","), (",", ",")),
-)
-_NUMBER: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
-_NOTHING: Final = frozenset(
-    (
-        *("", "nan", "na", "n/a", "null", "none", "-", "--", "inf", "+inf", "-inf", "infinity"),
-        *("#n/a", "#div/0!", "#name?", "#null!", "#num!", "#ref!", "#value!"),  # of Excel
-    )
-)
-# Words that loggers write for the levels of a trigger
-_LEVELS: Final = {
-    **dict.fromkeys(("true", "high", "on"), "1"),
-    **dict.fromkeys(("false", "low", "off"), "0"),
-}
 _CONTROLS: Final = re.compile(r"[\x01-\x08\x0b\x0e-\x1f\x7f]")
 _KNOWN: Final = {
     b"\x1f\x8b": "must be unpacked, it is compressed",
