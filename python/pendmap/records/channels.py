@@ -74,9 +74,13 @@ def channels_of(  # noqa: C901 (a step each)
     _check(places, table, where, timed="time" in values)
     for channel, place in places.items():
         if place in table.texts:
+            free = [
+                k + 1 for k in range(len(table.names)) if k not in {*places.values(), *table.texts}
+            ]
+            more = f"; {by_hand(where, **{channel: free[0]})} takes another" if free else ""
+            head = f"column {place + 1} ({head_of(table, place)!r})"
             raise InputError(
-                f"{where}: {channel}: column {place + 1} ({head_of(table, place)!r}) must be numbers,"
-                f" got {table.texts[place]}; {by_hand(where, **{channel: 3})} takes another"
+                f"{where}: {channel}: {head} must be numbers, got {table.texts[place]}{more}"
             )
         column, counts = asked.get(channel, Column()), known.get("encoder_counts")
         raw, head = table.values[:, place], table.names[place]
