@@ -102,7 +102,7 @@ def split(line: str, delimiter: str) -> list[str]:
     """Return the cells of a line."""
     if '"' in line:
         line = " ".join(line.split()) if delimiter == " " else line
-        return next(csv.reader([line], delimiter=delimiter))
+        return next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))
     return line.split() if delimiter == " " else line.split(delimiter)
 
 
@@ -115,7 +115,8 @@ def weight(cell: str, decimal: str) -> float | None:
         return None
     grouped = _GROUPED[decimal].fullmatch(cell)
     if grouped:
-        return 1.0 if grouped["rest"] or grouped["set"] in "' " else _DOUBT
+        doubt = _DOUBT * (grouped["set"] != " ")  # 1 234 may be two numbers
+        return 1.0 if grouped["rest"] or grouped["set"] == "'" else doubt
     known = _CLOCK.fullmatch(cell) or cell.lower() in _LEVELS or _LABELLED[decimal].fullmatch(cell)
     return 1.0 if known else 0.0
 

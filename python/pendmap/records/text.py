@@ -319,7 +319,7 @@ def _parts(line: str, columns: Sequence[Column], form: _Form) -> list[str]:
     parts = split(bare if form.delimiter == ";" else bare.lstrip("; "), form.delimiter)
     names = _trimmed(parts)
     first = columns[0]
-    if len(names) == width - 1 and (first.kind == "text" or np.all(np.diff(first.values) == 1)):
+    if len(names) == width - 1 > 1 and (first.kind == "text" or np.all(np.diff(first.values) == 1)):
         return ["", *names]  # the first column numbers the rows
     # Columns at the end may be empty.
     fits = len(parts) >= width and (len(names) <= form.width or form.delimiter in "\t;|")
