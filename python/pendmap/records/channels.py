@@ -11,6 +11,7 @@ import numpy as np
 from pendmap.errors import InputError, short_repr
 from pendmap.formatting import listed
 from pendmap.model.quantities import GRAVITY
+from pendmap.records.by_hand import by_hand
 from pendmap.records.description import Column
 from pendmap.records.experiment import finding_of
 from pendmap.records.rod_sensors import accelerometer_of
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
     from pendmap.records.description import Description, RunPlan
     from pendmap.records.experiment import Finding
-    from pendmap.records.tables import Table
+    from pendmap.records.text import Table
     from pendmap.signal import Floats
 
 _MOST_NAMED: Final = 8  # Most columns listed in a message
@@ -72,6 +73,15 @@ def channels_of(  # noqa: C901 (a step each)
         findings.append(finding_of("rate-unused", column=head, rate=rate))
     _check(places, table, where, timed="time" in values)
     for channel, place in places.items():
+        if place in table.texts:
+            free = [
+                k + 1 for k in range(len(table.names)) if k not in {*places.values(), *table.texts}
+            ]
+            more = f"; {by_hand(where, **{channel: free[0]})} takes another" if free else ""
+            head = f"column {place + 1} ({head_of(table, place)!r})"
+            raise InputError(
+                f"{where}: {channel}: {head} must be numbers, got {table.texts[place]}{more}"
+            )
         column, counts = asked.get(channel, Column()), known.get("encoder_counts")
         raw, head = table.values[:, place], table.names[place]
         values[channel] = _in_si(channel, raw, head, column, counts, f"{where}: {channel}")

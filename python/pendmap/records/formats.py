@@ -15,7 +15,8 @@ from pendmap.formatting import listed
 from pendmap.records.channels import ANGLE_CHANNELS, guess
 from pendmap.records.experiment import finding_of
 from pendmap.records.matlab import matlab_frame
-from pendmap.records.tables import MOST_BYTES, decoded, parsed, refuse_large, table_of
+from pendmap.records.tables import MOST_BYTES, decoded, refuse_large, table_of
+from pendmap.records.text import parsed
 from pendmap.records.tracker import TRACKER, tracker_frame
 from pendmap.records.workbooks import is_workbook, sheet_text
 
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from pendmap.records.description import Reader
-    from pendmap.records.tables import Table
+    from pendmap.records.text import Table
 
 _TEXTS: Final = (".csv", ".tsv", ".txt", ".dat")
 _BINARY: Final = (".parquet", ".pq", ".xlsx", ".ods", ".mat", ".trk", ".trz", ".zip")

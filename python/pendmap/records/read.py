@@ -23,7 +23,7 @@ from pendmap.records.tables import is_frame, table_of
 if TYPE_CHECKING:
     import pandas as pd
 
-    from pendmap.records.tables import Table
+    from pendmap.records.text import Table
     from pendmap.records.work import Work
 
     Records: TypeAlias = Experiment | Run | pd.DataFrame | str | os.PathLike[str]
