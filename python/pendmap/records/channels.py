@@ -53,7 +53,7 @@ def channels_of(  # noqa: C901 (a step each)
         name = column.name or CHANNELS[channel].default
         # Without a name it gives unit, scale or zero of a column that is found by its usual names.
         if column.name is not None or name in table.names:
-            places[channel] = _place(name, table, f"{where}: [columns]: {channel}")
+            places[channel] = _place(name, table, f"{where}: {channel}")
     for channel, kind in CHANNELS.items():
         if channel in places or kind.default not in table.names:
             continue
@@ -61,9 +61,12 @@ def channels_of(  # noqa: C901 (a step each)
         # [columns] may say that theta_rad holds turning points: then it holds no angles.
         if channel != "angle" or place != places.get("peaks"):
             places[channel] = place
+    # A channel without a column is none that is looked for.
+    places |= {channel: -1 for channel, column in asked.items() if column.unused}
     rate, known = description.rate_hz, description.known
     findings = use_pixels(table, places, asked)
     findings += guess(table, places, timed=rate is None)
+    places = {channel: place for channel, place in places.items() if place >= 0}
     values, heads = {}, {}
     if rate and "time" not in places:
         values["time"], heads["time"] = table.order / rate, f"{rate:g} readings a second"
@@ -103,6 +106,7 @@ def channels_of(  # noqa: C901 (a step each)
         findings=[*table.findings, *findings],
         columns=heads,
         unused=unused,
+        places=places,
         accelerometer=sensor,
         place_missing=missing,
         edge=asked.get("trigger", Column()).edge,
@@ -110,25 +114,24 @@ def channels_of(  # noqa: C901 (a step each)
     )
 
 
-def _place(name: str, table: Table, where: str) -> int:
-    """Return the index of a column by its heading, with or without the unit."""
+def _place(name: str | int, table: Table, where: str) -> int:
+    """Return the index of a column by its number or its heading, with or without the unit."""
+    if isinstance(name, int) and name <= len(table.names):
+        return name - 1
     if name in table.names:
         return table.names.index(name)
     bare = [name_and_unit(head)[0] for head in table.names]
-    if bare.count(name) == 1:
-        return bare.index(name)
-    if not any(table.names):
-        raise InputError(f"{where}: {short_repr(name)}: the file has no line of names")
-    near = difflib.get_close_matches(name, table.names, 1, 0.6)
+    if bare.count(str(name)) == 1:
+        return bare.index(str(name))
+    near = difflib.get_close_matches(str(name), table.names, 1, 0.6)
     perhaps = f", perhaps {near[0]!r} is meant" if near else ""
-    raise InputError(
-        f"{where}: no column {short_repr(name)}{perhaps}: it must be one of {_names(table)}"
-    )
+    raise InputError(f"{where} must be a column: {_names(table)}, got {short_repr(name)}{perhaps}")
 
 
 def _names(table: Table) -> str:
-    """Return the headings of a table for a message."""
-    return listed([repr(name[:40] or "(no name)") for name in table.names], _MOST_NAMED)
+    """Return the numbers and headings of a table for a message."""
+    names = [f"{k} {name[:40]!r}" if name else str(k) for k, name in enumerate(table.names, 1)]
+    return listed(names, _MOST_NAMED)
 
 
 def _check(places: dict[str, int], table: Table, where: str, *, timed: bool) -> None:

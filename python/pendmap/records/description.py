@@ -34,6 +34,7 @@ NAME: Final = "experiment.toml"
 RATE: Final = "rate_hz"
 LARGEST: Final = 1e12  # Greatest magnitude of a number in a description
 NUMBER: Final = (-LARGEST, LARGEST)
+COLUMN: Final = object()  # Rule of a heading, or of the number of a column from 1
 POSITIVE: Final = (1 / LARGEST, LARGEST)
 RATES: Final = (1e-3, 1e9)  # Sampling rates, Hz
 
@@ -57,7 +58,8 @@ class Rig:
 class Column:
     """Column of a channel; position of an accelerometer, edge of a trigger."""
 
-    name: str | None = _key(str)
+    name: str | int | None = _key(COLUMN)  # heading, or number from 1
+    unused: bool = _key(bool, default=False)  # no column has this channel
     unit: str | None = _key(str)
     scale: float | None = _key(NUMBER)  # SI unit per unit of the column
     zero: float = _key(NUMBER, 0.0)  # in the unit of the column
@@ -134,6 +136,7 @@ class Description:
     rate_hz: float | None = None
     reader: Reader = Reader()
     runs: tuple[RunPlan, ...] = ()
+    by_hand: frozenset[str] = frozenset()  # channels whose unit or scale is given by hand
 
 
 def read_description(path: Path) -> Description:
@@ -205,6 +208,8 @@ def checked(name: str, value: object, rule: Any) -> Any:  # noqa: ANN401 (of any
     """Return a value that is of a type, a dataclass, in a range, or one of a list."""
     if isinstance(rule, type) and dataclasses.is_dataclass(rule):
         return _parsed(rule, name, value)
+    if rule is COLUMN:
+        rule = str if isinstance(value, str) else range(1, 1001)
     if rule is bool:
         return check_flag(name, value)
     if isinstance(rule, range):
@@ -241,7 +246,7 @@ def _reader(value: object) -> Reader:
 def _column(channel: str, value: object) -> Column:
     """Return the checked column of a channel."""
     where = f"[columns]: {channel}"
-    value = {"name": value} if isinstance(value, str) else value
+    value = {"name": value} if isinstance(value, str | int) else value
     others = [key for key, only in ONLY_OF.items() if only != channel]
     column = _parsed(Column, where, value, others)
     if column.scale == 0:

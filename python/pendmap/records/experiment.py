@@ -8,13 +8,19 @@ import tomllib
 from importlib import resources
 from typing import TYPE_CHECKING, Any, Final
 
-from pendmap.errors import InputError
+import numpy as np
+
+from pendmap.errors import InputError, short_repr
+from pendmap.formatting import Readable, counted
 from pendmap.model.quantities import GRAVITY
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
     from pathlib import Path
 
+    import pandas as pd
+
+    from pendmap.formatting import Table
     from pendmap.records.description import Kind
     from pendmap.records.rod_sensors import Accelerometer, Gyroscope
     from pendmap.signal import Floats, Mask
@@ -86,8 +92,31 @@ class Segment:
     used: bool
 
 
-@dataclasses.dataclass(frozen=True)
-class Run:
+def _summary(run: Run) -> dict[str, Any]:
+    """Return the row of a run in the table of an experiment."""
+    first, last = (float(run.time[k]) for k in (0, -1)) if run.time.size else (np.nan, np.nan)
+    return {
+        "name": run.name,
+        "kind": run.kind,
+        "samples": run.time.size,
+        "trusted": int(run.trusted.sum()),
+        "rate_hz": run.rate_hz,
+        "from_s": first,
+        "to_s": last,
+        "largest_rad": float(np.abs(run.theta[run.trusted]).max(initial=0.0)),
+        "findings": len(run.findings),
+    }
+
+
+def _table_of(runs: Sequence[Run]) -> Table:
+    """Return header and rows of a table of runs."""
+    rows = [_summary(run) for run in runs]
+    cells = [[f"{x:.5g}" if isinstance(x, float) else str(x) for x in row.values()] for row in rows]
+    return [*(rows[0] if rows else ())], cells
+
+
+@dataclasses.dataclass(frozen=True, repr=False)
+class Run(Readable):
     """One record in SI, corrected if the correction is unambiguous.
 
     Parameters
@@ -166,6 +195,36 @@ class Run:
     sha256: str = ""
     clock_stderr: float = 0.0
 
+    def __repr__(self) -> str:
+        facts = _summary(self)
+        span = f"{facts['from_s']:g} to {facts['to_s']:g} s"
+        many = ", ".join(counted(facts[key], key[:-1]) for key in ("samples", "findings"))
+        return f"<Run {self.name}: {self.kind}, {span}, {many}>"
+
+    def text_parts(self) -> tuple[list[Table], list[str]]:
+        """Return a table of one row, and the texts of the findings."""
+        return [_table_of([self])], [finding.text for finding in self.findings]
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the samples.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Index ``t_s``; ``theta_rad``, ``velocity_rad_s`` and ``acceleration_m_s2`` if measured,
+            and ``trusted``, whether a sample is for fitting.
+        """
+        import pandas as pd
+
+        columns = {
+            "theta_rad": self.theta,
+            "velocity_rad_s": self.velocity,
+            "acceleration_m_s2": self.acceleration,
+            "trusted": self.trusted,
+        }
+        measured = {name: values for name, values in columns.items() if values is not None}
+        return pd.DataFrame(measured, index=pd.Index(self.time, name="t_s"))
+
     @property
     def moves(self) -> bool:
         """Whether any sample is for fitting."""
@@ -195,9 +254,9 @@ class Run:
         return 1 / intervals_of(self.time).tick if self.time.size > 1 else 0.0
 
 
-@dataclasses.dataclass(frozen=True)
-class Experiment:
-    """Runs of one rig.
+@dataclasses.dataclass(frozen=True, repr=False)
+class Experiment(Readable):
+    """Runs of one rig; a collection of them, ``experiment["run_00"]`` by name or by number.
 
     Parameters
     ----------
@@ -218,6 +277,42 @@ class Experiment:
     known: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
     sha256: Mapping[str, str] = dataclasses.field(default_factory=dict)
+
+    def __iter__(self) -> Iterator[Run]:
+        return iter(self.runs)
+
+    def __len__(self) -> int:
+        return len(self.runs)
+
+    def __getitem__(self, name: str | int) -> Run:
+        if not isinstance(name, str):
+            return self.runs[name]
+        runs = {run.name: run for run in self.runs}
+        if name not in runs:
+            raise InputError(f"run must be one of {', '.join(runs)}, got {short_repr(name)}")
+        return runs[name]
+
+    def __repr__(self) -> str:
+        free = sum(run.kind == "free" for run in self.runs)
+        return f"<Experiment {self.path.name}: {counted(len(self), 'run')}, {free} free>"
+
+    def text_parts(self) -> tuple[list[Table], list[str]]:
+        """Return a table of the runs, and the texts of the findings about the experiment."""
+        return [_table_of(self.runs)], [finding.text for finding in self.findings]
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return one row a run.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Index ``name``; ``kind``, numbers of ``samples``, of ``trusted`` ones and of
+            ``findings``, ``rate_hz``, first and last time ``from_s`` and ``to_s``, and
+            ``largest_rad``, the greatest absolute angle of the trusted samples.
+        """
+        import pandas as pd
+
+        return pd.DataFrame([_summary(run) for run in self.runs]).set_index("name")
 
     @property
     def w0(self) -> float | None:

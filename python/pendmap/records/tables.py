@@ -136,13 +136,6 @@ def _parquet(data: bytes, where: str) -> Table:
         raise InputError(f"{where}: is no Parquet file that can be read: {error}") from None
 
 
-def is_frame(records: object) -> bool:
-    """Return whether records are a DataFrame."""
-    import pandas as pd
-
-    return isinstance(records, pd.DataFrame)
-
-
 def table_of(frame: pd.DataFrame, where: str) -> Table:
     """Return the numbers of a DataFrame; an index of times, or one with a name, is a column too."""
     import pandas as pd
@@ -159,7 +152,7 @@ def table_of(frame: pd.DataFrame, where: str) -> Table:
     for k in range(frame.shape[1]):
         column = frame.iloc[:, k]
         if pd.api.types.is_datetime64_any_dtype(column):
-            column = column - column.iloc[0]
+            column = column - column.bfill().iloc[0]
         if pd.api.types.is_timedelta64_dtype(column):
             column = column.dt.total_seconds()
         elif isinstance(column.dtype, pd.CategoricalDtype):

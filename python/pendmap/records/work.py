@@ -52,6 +52,7 @@ class Work:
     findings: list[Finding]
     columns: Mapping[str, str]  # heading of each channel
     unused: tuple[str, ...]  # headings of columns without a channel
+    places: Mapping[str, int]  # index of the column of each channel
     segments: list[Segment] = dataclasses.field(default_factory=list)
     count: float = 0.0  # step of the readings, declared or estimated, rad; 0 for none
     estimated_step: float = 0.0  # step estimated from the readings, rad; 0 for none
