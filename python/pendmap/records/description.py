@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import math
+import re
 from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar
 
 from pendmap.errors import (
@@ -34,6 +35,7 @@ NAME: Final = "experiment.toml"
 RATE: Final = "rate_hz"
 LARGEST: Final = 1e12  # Greatest magnitude of a number in a description
 NUMBER: Final = (-LARGEST, LARGEST)
+COUNTS: Final = re.compile("counts?|ticks?", re.IGNORECASE)
 COLUMN: Final = object()  # Rule of a heading, or of the number of a column from 1
 POSITIVE: Final = (1 / LARGEST, LARGEST)
 RATES: Final = (1e-3, 1e9)  # Sampling rates, Hz
@@ -158,10 +160,15 @@ def _description(content: dict[str, Any]) -> Description:
     columns = _table("[columns]", content.get("columns", {}))
     _refuse_unknown(columns, (*CHANNELS, RATE), "[columns]")
     rig = dataclasses.asdict(_parsed(Rig, "[rig]", content.get("rig", {})))
+    counts = rig["encoder_counts"] is not None
     reader = _reader(content.get("reader", {}))
     return Description(
         {name: value for name, value in rig.items() if value is not None},
-        {name: _column(name, value) for name, value in columns.items() if name != RATE},
+        {
+            name: _column(name, value, counts=counts)
+            for name, value in columns.items()
+            if name != RATE
+        },
         checked(f"[columns]: {RATE}", columns[RATE], RATES) if RATE in columns else None,
         reader,
         plans,
@@ -243,7 +250,7 @@ def _reader(value: object) -> Reader:
     return reader
 
 
-def _column(channel: str, value: object) -> Column:
+def _column(channel: str, value: object, *, counts: bool) -> Column:
     """Return the checked column of a channel."""
     where = f"[columns]: {channel}"
     value = {"name": value} if isinstance(value, str | int) else value
@@ -252,6 +259,8 @@ def _column(channel: str, value: object) -> Column:
     if column.scale == 0:
         raise InputError(f"{where}: scale must be any number but 0, got 0")
     if column.unit is None or column.scale is not None:
+        return column
+    if counts and channel == "angle" and COUNTS.fullmatch(column.unit):
         return column
     angular = spelling(column.unit) in ANGULAR_ACCELERATIONS
     if column.direction is not None and angular != (column.direction == "angular"):

@@ -56,6 +56,4 @@ def _heading(values: Any, usual: str) -> str:  # noqa: ANN401 (an array)
     """Return the name of an array, with the unit that its attributes give."""
     name = str(getattr(values, "name", None) or usual)
     unit = str(getattr(values, "attrs", {}).get("units", "")).partition(" since ")[0]
-    if not unit or name_and_unit(name)[1] is not None and name != usual:
-        return name
-    return f"{name_and_unit(name)[0]} [{unit}]"
+    return f"{name_and_unit(name)[0]} [{unit}]" if unit else name

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-import re
 from typing import TYPE_CHECKING, Any, Final, TypedDict
 
 from pendmap.errors import InputError, short_repr
 from pendmap.files import toml_text, whole_file
 from pendmap.records.by_hand import by_hand
-from pendmap.records.description import COLUMN, NUMBER, RATE, RATES, Column, checked
+from pendmap.records.description import COLUMN, COUNTS, NUMBER, RATE, RATES, Column, checked
 from pendmap.records.units import CHANNELS, spelling
 
 if TYPE_CHECKING:
@@ -27,12 +26,14 @@ class ByHand(TypedDict, total=False):
 
     Parameters
     ----------
-    time, angle : str or int
-        Column of the times, or of the angle.
+    time : str or int
+        Column of the times.
+    angle : str or int
+        Column of the angle.
     velocity : str or int
-        Column of an angular velocity, whose integral is the angle where no ``angle`` is given.
+        Column of an angular velocity; without an angle, this is its integral.
     x, y : str or int
-        Column of a position of the bob, on the circle of which the angle is where none is given.
+        Column of a coordinate of the bob; without an angle, this is that on the bob's circle.
     time_unit : str
         Unit of the times, like ms.
     angle_unit : str
@@ -40,9 +41,11 @@ class ByHand(TypedDict, total=False):
     angle_scale : float
         Angle per unit of its column, rad; of a velocity given alone, rad/s.
     rate_hz : float
-        Sampling rate, Hz, of records without a column of times.
-    from_s, to_s : float
-        First or last time that is used, s on the clock of the record.
+        Sampling rate, Hz, of records without a column of times in order.
+    from_s : float
+        First time that is used, s on the clock of the record.
+    to_s : float
+        Last time that is used, s on the clock of the record.
     counts_per_turn : int
         Counts of the encoder in a turn.
     """
@@ -69,7 +72,6 @@ _RULES: Final[Mapping[str, object]] = {
     "rate_hz": RATES,
     "counts_per_turn": range(1, 10**9),
 }
-COUNTS: Final = re.compile("counts?|ticks?", re.IGNORECASE)
 # Channels from which the angle can come
 SOURCES: Final = ("angle", "peaks", "pixel_x", "pixel_y", "velocity", "acceleration")
 _CHANNELS: Final = {
@@ -147,11 +149,13 @@ def _unit(name: str, unit: str, channel: str, *, counts: bool) -> str:
 def refuse_unused(work: Work, description: Description) -> None:
     """Raise InputError if a unit is given by hand for a channel that no column has."""
     for channel in description.by_hand - work.columns.keys():
-        read = ", ".join(f"{name} from {column!r}" for name, column in work.columns.items())
-        example = by_hand(work.where, velocity="COLUMN", angle_unit="deg")
+        column, rate = description.columns[channel], work.columns.get("velocity")
+        given = {"angle_unit": column.unit, "angle_scale": column.scale}
+        given = {name: value for name, value in given.items() if value is not None}
+        example = "" if rate is None else f": {by_hand(work.where, velocity=rate, **given)}"
         raise InputError(
-            f"{work.where}: {channel}_unit must be that of a column of the {channel}, got {read}:"
-            f" {example}"
+            f"{work.where}: {' and '.join(given)} must be that of a column, got no column of the"
+            f" {channel}{example or work.other('angle')}"
         )
 
 

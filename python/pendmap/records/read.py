@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final, TypeAlias
 from pendmap.errors import InputError, short_repr
 from pendmap.formatting import counted, listed
 from pendmap.records.across import checked_together
-from pendmap.records.by_hand import FRAME
+from pendmap.records.by_hand import FRAME, given_by_hand
 from pendmap.records.channels import channels_of
 from pendmap.records.description import NAME, Description, RunPlan, read_description
 from pendmap.records.experiment import Experiment, Finding, Run, finding_of
@@ -127,18 +127,22 @@ def read_described(
     taken: Taken = {}
     if isinstance(path, str | os.PathLike) and theta is None:
         place = Path(path)
+        described = (place / NAME).is_file()
         planned = overridden(_planned(place), by_hand)
-        runs, findings = _every(place, planned, taken)
+        with given_by_hand(str(place) if described else "", by_hand):
+            runs, findings = _every(place, planned, taken)
     else:
         frame = frame_of(path, theta)
         if frame is None:
             wanted = "a path, a table of pandas or xarray, or times with theta beside them"
             raise InputError(f"path must be {wanted}, got {short_repr(path)}")
-        first: ByHand = {} if theta is None else {"time": 1, "angle": 2}
+        if theta is not None:
+            by_hand = {"time": 1, "angle": 2, **by_hand}
         place, plan = Path(FRAME), RunPlan(FRAME)
-        planned = overridden(Description(runs=(plan,)), {**first, **by_hand})
+        planned = overridden(Description(runs=(plan,)), by_hand)
         tables = {FRAME: (table_of(frame, FRAME), "")}
-        runs, findings = _runs(place, planned.runs[0], planned, tables, FRAME, taken)
+        with given_by_hand("", by_hand):
+            runs, findings = _runs(place, planned.runs[0], planned, tables, FRAME, taken)
     digests = {run.file: run.sha256 for run in runs if run.sha256}
     unique, together = checked_together(runs)
     experiment = Experiment(place, unique, planned.known, (*findings, *together), digests)
@@ -157,9 +161,9 @@ def experiment_of(
     known of the rig must agree. ``by_hand`` applies to what is read.
     """
     if theta is not None:
-        return read_experiment(records, theta, **by_hand)  # type: ignore[arg-type]
+        return read_experiment(records, theta, **by_hand)
     if isinstance(records, str) or not isinstance(records, Sequence):
-        records = [records]  # type: ignore[list-item]
+        records = [records]
     parts = [_experiment(part, by_hand) for part in records]
     if not parts:
         raise InputError(f"records must be {_FORMS}, got {short_repr(records)}")
@@ -187,7 +191,7 @@ def experiment_of(
 def _experiment(records: object, by_hand: ByHand) -> Experiment:
     """Return one form of records as an experiment."""
     if isinstance(records, str | os.PathLike) or frame_of(records) is not None:
-        return read_experiment(records, **by_hand)  # type: ignore[arg-type]
+        return read_experiment(records, **by_hand)
     if not isinstance(records, Run | Experiment):
         raise InputError(f"records must be {_FORMS}, got {short_repr(records)}")
     for name, value in by_hand.items():

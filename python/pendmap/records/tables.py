@@ -158,6 +158,9 @@ def table_of(frame: pd.DataFrame, where: str) -> Table:
         elif isinstance(column.dtype, pd.CategoricalDtype):
             column = column.astype(object)
         numbers = pd.to_numeric(column, errors="coerce")
+        if numbers.isna().all():
+            dates = pd.to_datetime(column, errors="coerce", format="ISO8601", utc=True)
+            numbers = (dates - dates.bfill().iloc[0]).dt.total_seconds()
         columns.append(numbers.to_numpy(dtype=float, na_value=np.nan))
     values = np.column_stack(columns)
     order = np.arange(values.shape[0])
