@@ -49,6 +49,6 @@ def command(*, path: Path, write_experiment: bool, **given: Any) -> None:  # noq
         file = File("model", place, "--write-experiment")
         keep_files([] if overwrite else [file])
         outputs = dataclasses.replace(outputs, files=(*outputs.files, file))
-    experiment, description = read_described(path, **take_reading(given))
+    experiment, description = read_described(path, None, take_reading(given))
     written = outputs.write(experiment, functools.partial(save_description, description))
     outputs.finish(written, lambda: as_json(experiment), [as_text(experiment)])

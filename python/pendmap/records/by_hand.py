@@ -2,27 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
 import shlex
 from contextvars import ContextVar
-from typing import TYPE_CHECKING, Final
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+from typing import Final
 
 FRAME: Final = "DataFrame"  # Name of a record that has no file
-_GIVEN: Final = ContextVar[tuple[str, dict[str, object]]]("given", default=("", {}))
-
-
-@contextlib.contextmanager
-def given_by_hand(place: str, options: Mapping[str, object]) -> Iterator[None]:
-    """Let commands repeat options that are given, and read a place, if any, instead of its file."""
-    options = {name: value for name, value in options.items() if value is not None}
-    token = _GIVEN.set((place, dict(options)))
-    try:
-        yield
-    finally:
-        _GIVEN.reset(token)
+GIVEN: Final = ContextVar[tuple[str, tuple[tuple[str, object], ...]]]("given", default=("", ()))
+"""Folder whose description is read, if any, and the options given, which commands repeat."""
 
 
 def by_hand(where: str, **options: object) -> str:
@@ -31,11 +17,11 @@ def by_hand(where: str, **options: object) -> str:
     >>> by_hand("run 1.csv", time=1, angle="theta 2", angle_unit="deg")
     "pendmap look 'run 1.csv' --time 1 --angle 'theta 2' --angle-unit deg"
     """
-    place, given = _GIVEN.get()
-    options = given | options
+    place, given = GIVEN.get()
+    options = dict(given) | options
     if where == FRAME:
-        call = (f", {name}={value!r}" for name, value in options.items())
-        return f"pendmap.read_experiment({where}{''.join(call)})"
+        call = ", ".join(f"{name}={value!r}" for name, value in options.items())
+        return f"pendmap.read_experiment({where}, {call})"
     words = ["pendmap", "look", place or where]
     for name, value in options.items():
         option = name.removesuffix("_s").removesuffix("_hz").replace("_", "-")

@@ -16,16 +16,13 @@ from pendmap.errors import (
     check_flag,
     check_number,
     check_whole,
-    named,
     short_repr,
     shown_key,
 )
-from pendmap.files import read_toml
 from pendmap.records.units import ANGULAR_ACCELERATIONS, CHANNELS, PIVOT_UNITS, spelling
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
-    from pathlib import Path
 
 T = TypeVar("T")
 Kind = Literal["free", "forced"]
@@ -138,18 +135,10 @@ class Description:
     rate_hz: float | None = None
     reader: Reader = Reader()
     runs: tuple[RunPlan, ...] = ()
-    by_hand: frozenset[str] = frozenset()  # channels whose unit or scale is given by hand
 
 
-def read_description(path: Path) -> Description:
-    """Read an ``experiment.toml``; raise InputError, with the path, for invalid content."""
-    content = read_toml(path)
-    with named(str(path)):
-        return _description(content)
-
-
-def _description(content: dict[str, Any]) -> Description:
-    """Return the checked description from the file's tables."""
+def description_of(content: dict[str, Any]) -> Description:
+    """Return the checked description from its tables; raise InputError for invalid ones."""
     _refuse_unknown(
         content, ("rig", "columns", "reader", "run"), "", "[rig], [columns], [reader] and [[run]]"
     )

@@ -8,10 +8,8 @@ import tomllib
 from importlib import resources
 from typing import TYPE_CHECKING, Any, Final
 
-import numpy as np
-
 from pendmap.errors import InputError, short_repr
-from pendmap.formatting import Readable, counted
+from pendmap.formatting import counted
 from pendmap.model.quantities import GRAVITY
 
 if TYPE_CHECKING:
@@ -20,7 +18,6 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from pendmap.formatting import Table
     from pendmap.records.description import Kind
     from pendmap.records.rod_sensors import Accelerometer, Gyroscope
     from pendmap.signal import Floats, Mask
@@ -92,31 +89,8 @@ class Segment:
     used: bool
 
 
-def _summary(run: Run) -> dict[str, Any]:
-    """Return the row of a run in the table of an experiment."""
-    first, last = (float(run.time[k]) for k in (0, -1)) if run.time.size else (np.nan, np.nan)
-    return {
-        "name": run.name,
-        "kind": run.kind,
-        "samples": run.time.size,
-        "trusted": int(run.trusted.sum()),
-        "rate_hz": run.rate_hz,
-        "from_s": first,
-        "to_s": last,
-        "largest_rad": float(np.abs(run.theta[run.trusted]).max(initial=0.0)),
-        "findings": len(run.findings),
-    }
-
-
-def _table_of(runs: Sequence[Run]) -> Table:
-    """Return header and rows of a table of runs."""
-    rows = [_summary(run) for run in runs]
-    cells = [[f"{x:.5g}" if isinstance(x, float) else str(x) for x in row.values()] for row in rows]
-    return [*(rows[0] if rows else ())], cells
-
-
 @dataclasses.dataclass(frozen=True, repr=False)
-class Run(Readable):
+class Run:
     """One record in SI, corrected if the correction is unambiguous.
 
     Parameters
@@ -196,14 +170,11 @@ class Run(Readable):
     clock_stderr: float = 0.0
 
     def __repr__(self) -> str:
-        facts = _summary(self)
-        span = f"{facts['from_s']:g} to {facts['to_s']:g} s"
-        many = ", ".join(counted(facts[key], key[:-1]) for key in ("samples", "findings"))
-        return f"<Run {self.name}: {self.kind}, {span}, {many}>"
+        span = f"{self.time[0]:g} to {self.time[-1]:g} s" if self.time.size else "no time"
+        return f"<Run {self.name}: {self.kind}, {counted(self.time.size, 'sample')}, {span}>"
 
-    def text_parts(self) -> tuple[list[Table], list[str]]:
-        """Return a table of one row, and the texts of the findings."""
-        return [_table_of([self])], [finding.text for finding in self.findings]
+    def _repr_html_(self) -> str:
+        return str(self.to_dataframe().to_html(max_rows=10))
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return the samples.
@@ -211,19 +182,15 @@ class Run(Readable):
         Returns
         -------
         pandas.DataFrame
-            Index ``t_s``; ``theta_rad``, ``velocity_rad_s`` and ``acceleration_m_s2`` if measured,
-            and ``trusted``, whether a sample is for fitting.
+            Index ``t_s``; ``theta_rad``, the measured ones of ``velocity_rad_s`` and
+            ``acceleration_m_s2``, and ``trusted``.
         """
         import pandas as pd
 
-        columns = {
-            "theta_rad": self.theta,
-            "velocity_rad_s": self.velocity,
-            "acceleration_m_s2": self.acceleration,
-            "trusted": self.trusted,
-        }
-        measured = {name: values for name, values in columns.items() if values is not None}
-        return pd.DataFrame(measured, index=pd.Index(self.time, name="t_s"))
+        further = {"velocity_rad_s": self.velocity, "acceleration_m_s2": self.acceleration}
+        columns = {"theta_rad": self.theta} | {k: v for k, v in further.items() if v is not None}
+        frame = pd.DataFrame(columns, index=pd.Index(self.time, name="t_s"))
+        return frame.assign(trusted=self.trusted)
 
     @property
     def moves(self) -> bool:
@@ -255,7 +222,7 @@ class Run(Readable):
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
-class Experiment(Readable):
+class Experiment:
     """Runs of one rig; a collection of them, ``experiment["run_00"]`` by name or by number.
 
     Parameters
@@ -296,9 +263,8 @@ class Experiment(Readable):
         free = sum(run.kind == "free" for run in self.runs)
         return f"<Experiment {self.path.name}: {counted(len(self), 'run')}, {free} free>"
 
-    def text_parts(self) -> tuple[list[Table], list[str]]:
-        """Return a table of the runs, and the texts of the findings about the experiment."""
-        return [_table_of(self.runs)], [finding.text for finding in self.findings]
+    def _repr_html_(self) -> str:
+        return str(self.to_dataframe().to_html())
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return one row a run.
@@ -306,13 +272,22 @@ class Experiment(Readable):
         Returns
         -------
         pandas.DataFrame
-            Index ``name``; ``kind``, numbers of ``samples``, of ``trusted`` ones and of
-            ``findings``, ``rate_hz``, first and last time ``from_s`` and ``to_s``, and
-            ``largest_rad``, the greatest absolute angle of the trusted samples.
+            Index ``name``; ``kind``, numbers of ``samples`` and of those for fitting, ``trusted``,
+            ``rate_hz``, ``from_s``, ``to_s``, and the keys of its ``findings``.
         """
         import pandas as pd
 
-        return pd.DataFrame([_summary(run) for run in self.runs]).set_index("name")
+        columns = {
+            "name": [run.name for run in self],
+            "kind": [run.kind for run in self],
+            "samples": [run.time.size for run in self],
+            "trusted": [int(run.trusted.sum()) for run in self],
+            "rate_hz": [run.rate_hz for run in self],
+            "from_s": [run.time[0] for run in self],
+            "to_s": [run.time[-1] for run in self],
+            "findings": [", ".join(finding.what for finding in run.findings) for run in self],
+        }
+        return pd.DataFrame(columns).set_index("name")
 
     @property
     def w0(self) -> float | None:

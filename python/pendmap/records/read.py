@@ -7,17 +7,18 @@ import os
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
-from pendmap.errors import InputError, short_repr
+from pendmap.errors import InputError, named, short_repr
+from pendmap.files import read_toml
 from pendmap.formatting import counted, listed
 from pendmap.records.across import checked_together
-from pendmap.records.by_hand import FRAME, given_by_hand
+from pendmap.records.by_hand import FRAME, GIVEN
 from pendmap.records.channels import channels_of
-from pendmap.records.description import NAME, Description, RunPlan, read_description
+from pendmap.records.description import NAME, Description, RunPlan, description_of
 from pendmap.records.experiment import Experiment, Finding, Run, finding_of
 from pendmap.records.frames import frame_of
-from pendmap.records.overrides import as_taken, overridden, refuse_unused
+from pendmap.records.overrides import ByHand, by_option, name_columns, override, refuse_unused
 from pendmap.records.rod_sensors import gyroscope_of
 from pendmap.records.rules import OF_RELEASE, RULES, apply
 from pendmap.records.tables import read_table, table_of
@@ -29,19 +30,21 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike
 
-    from pendmap.records.overrides import ByHand
+    from pendmap.records.overrides import Taken
     from pendmap.records.tables import Table
     from pendmap.records.work import Work
 
     Frame: TypeAlias = pd.DataFrame | pd.Series | xr.Dataset | xr.DataArray
     Records: TypeAlias = Experiment | Run | Frame | str | os.PathLike[str]
-    Taken: TypeAlias = dict[str, dict[str, str | int]]  # columns of channels, by file
 
 # Suffixes of the files that are records in a folder without a description
 TABLES: Final = (".csv", ".tsv", ".txt", ".dat", ".parquet", ".pq", ".xlsx")
 _FORMS: Final = (
     "paths, arrays t and theta, DataFrames or xarray with columns like t_s and theta_rad, an"
     " Experiment like pendmap.read_experiment('folder'), Runs or a list of them"
+)
+_NO_RECORD: Final = (
+    f"{{place}}: has no {NAME}: there must be one, or files that are records, got {{got}}"
 )
 _SHOWN: Final = 3  # Names of records in the name of several together
 
@@ -56,9 +59,8 @@ def files_of(path: str | os.PathLike[str]) -> list[Path]:
     if not place.is_dir():
         return [place]
     description = [place / NAME] if (place / NAME).is_file() else []
-    return description + [
-        place / file for file in dict.fromkeys(plan.file for plan in _planned(place).runs)
-    ]
+    plans = _described(place, _tables_of(place)).runs
+    return description + [place / file for file in dict.fromkeys(plan.file for plan in plans)]
 
 
 def read_experiment(
@@ -77,16 +79,14 @@ def read_experiment(
 
     Parameters
     ----------
-    path : str, path, pandas.DataFrame, pandas.Series, xarray.Dataset, xarray.DataArray or array
-        File or folder; or the columns themselves, named as in a file, such as ``t_s`` and
-        ``theta_rad``: an index of dates, or one with a name, is a column too, and of xarray each
-        variable and coordinate along the longest dimension, in the unit of its attribute
-        ``units``. With ``theta`` the times, shape (N,): s, dates, or in the unit of their name.
+    path : str, path, array, DataFrame, Series, or Dataset or DataArray of xarray
+        File or folder; or columns named as in a file, such as ``t_s`` and ``theta_rad``, also an
+        index of dates or one with a name; of xarray what stands along the longest dimension, in the
+        unit of the attribute ``units``. With ``theta`` the times, shape (N,), s or dates.
     theta : array, shape (N,), optional
-        Angles from the downward rest: rad, or in the unit of their name.
+        Angles from the downward rest, rad; a name of the array may have another unit.
     **by_hand
-        Columns, units, clock and span of the record: :class:`pendmap.records.ByHand`. They apply to
-        every file of a folder and override its ``experiment.toml``.
+        Columns, units, clock and span: :class:`pendmap.records.ByHand`, of every file of a folder.
 
     Returns
     -------
@@ -110,43 +110,48 @@ def read_experiment(
     >>> np.savetxt("run.csv", rows, delimiter=",", header="t_s,theta_rad", comments="")
     >>> pendmap.read_experiment("run.csv")
     <Experiment run.csv: 1 run, 1 free>
-    >>> pendmap.read_experiment("run.csv", angle=2, to_s=10).runs[0].theta.size
-    1001
     >>> pendmap.read_experiment(time, np.degrees(theta), angle_unit="deg").runs[0].theta.size
     2000
     """
-    return read_described(path, theta, **by_hand)[0]
+    return read_described(path, theta, by_hand)[0]
 
 
 def read_described(
-    path: str | os.PathLike[str] | Frame | ArrayLike,
-    theta: ArrayLike | None = None,
-    **by_hand: Unpack[ByHand],
-) -> tuple[Experiment, Description]:
-    """Return :func:`read_experiment`, and the description with which a folder reads the same."""
-    taken: Taken = {}
-    if isinstance(path, str | os.PathLike) and theta is None:
+    path: object, theta: object, by_hand: ByHand
+) -> tuple[Experiment, dict[str, Any]]:
+    """Return :func:`read_experiment`, and the tables with which its folder is read in this way."""
+    if unknown := by_hand.keys() - ByHand.__annotations__.keys():
+        raise TypeError(f"got an unexpected keyword argument {unknown.pop()!r}")
+    given = {name: value for name, value in by_hand.items() if value is not None}
+    frame, taken = frame_of(path, theta), dict[str, dict[str, str | int]]()
+    if frame is not None:
+        place, content = Path(FRAME), _free_decays([FRAME])
+        given = given if theta is None else {"time": 1, "angle": 2} | given
+    elif isinstance(path, str | os.PathLike):
         place = Path(path)
-        described = (place / NAME).is_file()
-        planned = overridden(_planned(place), by_hand)
-        with given_by_hand(str(place) if described else "", by_hand):
-            runs, findings = _every(place, planned, taken)
+        content = _tables_of(place)
     else:
-        frame = frame_of(path, theta)
-        if frame is None:
-            wanted = "a path, a table of pandas or xarray, or times with theta beside them"
-            raise InputError(f"path must be {wanted}, got {short_repr(path)}")
-        if theta is not None:
-            by_hand = {"time": 1, "angle": 2, **by_hand}
-        place, plan = Path(FRAME), RunPlan(FRAME)
-        planned = overridden(Description(runs=(plan,)), by_hand)
+        wanted = "a path, a table of pandas or xarray, or times with theta beside them"
+        raise InputError(f"path must be {wanted}, got {short_repr(path)}")
+    described = (place / NAME).is_file() and frame is None
+    GIVEN.set((str(place) if described else "", tuple(given.items())))
+    planned = _described(place, content)
+    if given:
+        override(content, given)
+        try:
+            planned = description_of(content)
+        except InputError as error:
+            raise InputError(by_option(str(error))) from None
+    if frame is None:
+        runs, findings = _every(place, planned, taken)
+    else:
         tables = {FRAME: (table_of(frame, FRAME), "")}
-        with given_by_hand("", by_hand):
-            runs, findings = _runs(place, planned.runs[0], planned, tables, FRAME, taken)
+        runs, findings = _runs(place, planned.runs[0], planned, tables, FRAME, taken)
     digests = {run.file: run.sha256 for run in runs if run.sha256}
     unique, together = checked_together(runs)
     experiment = Experiment(place, unique, planned.known, (*findings, *together), digests)
-    return experiment, as_taken(planned, taken)
+    name_columns(content, taken)
+    return experiment, content
 
 
 def experiment_of(
@@ -203,15 +208,28 @@ def _experiment(records: object, by_hand: ByHand) -> Experiment:
     return Experiment(Path(records.file or records.name), (records,), sha256=digests)
 
 
-def _planned(place: Path) -> Description:
-    """Return the description of an experiment; without an ``experiment.toml``, of free decays."""
+def _tables_of(place: Path) -> dict[str, Any]:
+    """Return the tables of an ``experiment.toml``; without one, of free decays."""
     if (place / NAME).is_file():
-        return read_description(place / NAME)
+        return read_toml(place / NAME)
     files = [place]
     if place.is_dir():
         files = sorted(file for file in place.iterdir() if file.suffix.lower() in TABLES)
         files = [f for f in files if f.is_file() and not f.name.startswith((".", "~"))]
-    return Description(runs=tuple(RunPlan(file.name) for file in files))
+    return _free_decays([file.name for file in files])
+
+
+def _free_decays(files: Sequence[str]) -> dict[str, Any]:
+    """Return the tables of an experiment of free decays."""
+    return {"rig": {}, "columns": {}, "run": [{"file": file} for file in files]}
+
+
+def _described(place: Path, content: dict[str, Any]) -> Description:
+    """Return the description of a place; InputError if it is invalid, or there is no file."""
+    if not (place / NAME).is_file() and not content["run"]:
+        raise InputError(_NO_RECORD.format(place=place, got=f"0 files of {', '.join(TABLES)}"))
+    with named(str(place / NAME)):
+        return description_of(content)
 
 
 def _every(place: Path, description: Description, taken: Taken) -> tuple[list[Run], list[Finding]]:
@@ -239,11 +257,8 @@ def _every(place: Path, description: Description, taken: Taken) -> tuple[list[Ru
             runs += of_file
             findings += shared
     if not runs:
-        first = f", the first refused: {refused[0]}" if refused else f" of {', '.join(TABLES)}"
-        raise InputError(
-            f"{place}: has no {NAME}: there must be one, or files that are records, got"
-            f" {counted(len(refused), 'file')}{first}"
-        )
+        got = f"{counted(len(refused), 'file')}, the first refused: {refused[0]}"
+        raise InputError(_NO_RECORD.format(place=place, got=got))
     return runs, findings
 
 
@@ -273,7 +288,7 @@ def _runs(  # noqa: PLR0913, PLR0917 (what is known of the file)
         tables[plan.file] = read_table(path, description.reader)
     table, digest = tables[plan.file]
     work = channels_of(table, description, plan, str(path))
-    refuse_unused(work, description)
+    refuse_unused(work)
     apply(RULES, work)
     parts, shared = work.split_by_release()
     runs = []

@@ -111,13 +111,14 @@ def test_options_override_the_description_of_every_file(tmp_path: Path) -> None:
         ({"angle": "thet"}, r"angle must be one of 1 't', 2 'theta', got 'thet', perhaps 'theta'"),
         ({"time": 3}, "time must be one of 1 't', 2 'theta', got 3"),
         ({"angle": 0}, "must be a whole number from 1 to 1000, got 0"),
-        ({"angle-unit": "ell"}, "'--angle-unit': must be one of rad, .* counts with .*, got 'ell'"),
+        ({"angle-unit": "ell"}, "'--angle-unit': must be one of rad, .*, got 'ell'"),
         ({"time-unit": "deg"}, "'--time-unit': must be one of s, .*, got 'deg'"),
-        ({"angle-unit": "counts"}, "or counts with counts_per_turn, got 'counts'"),
+        ({"angle-unit": "counts"}, "'--angle-unit': must be one of rad, .*, got 'counts'"),
         ({"angle-scale": 0}, "'--angle-scale': must be any number but 0, got 0"),
         ({"from": 5, "to": 2}, "'--from': must be less than to_s = 2, got 5"),
         ({"from": 50}, "must be times within 0 to 12 s, they leave 0 samples"),
-        ({"x": 1}, "x and y must be given together, got one"),
+        ({"x": 2}, "both or neither of pixel_x and pixel_y must be given, got one"),
+        ({"counts-per-turn": 0}, "encoder_counts must be a whole number from 1 to .*, got 0"),
     ],
 )
 def test_an_invalid_value_is_refused_in_one_line(
@@ -246,9 +247,9 @@ def test_an_experiment_is_a_collection_of_runs(tmp_path: Path) -> None:
     assert table.index.tolist() == ["a", "b"]
     assert table["samples"].tolist() == [TIME.size] * 2
     assert repr(whole) == f"<Experiment {tmp_path.name}: 2 runs, 2 free>"
-    assert re.fullmatch(r"<Run a: free, 0 to 12 s, 1201 samples, \d findings?>", repr(whole["a"]))
-    assert "<td>b</td>" in whole._repr_html_()
-    assert "<td>b</td>" in whole["b"]._repr_html_()
+    assert re.fullmatch("<Run a: free, 1201 samples, 0 to 12 s>", repr(whole["a"]))
+    assert "<th>b</th>" in whole._repr_html_()
+    assert "<th>theta_rad</th>" in whole["b"]._repr_html_()
     samples = whole["a"].to_dataframe()
     np.testing.assert_array_equal(samples["trusted"], whole["a"].trusted)
     (again,) = pendmap.read_experiment(samples)

@@ -154,6 +154,6 @@ reading_options: Final = options_of(
 """Options that say how records are read."""
 
 
-def take_reading(given: dict[str, Any]) -> dict[str, Any]:
+def take_reading(given: dict[str, Any]) -> Any:  # noqa: ANN401 (a ByHand)
     """Remove the options that say how records are read from ``given`` and return them."""
     return {name: given.pop(name) for name in parameters("records.overrides.ByHand")}
