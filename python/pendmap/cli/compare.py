@@ -51,9 +51,10 @@ def command(
     reads = [model, *files_of(path)]
     outputs = Outputs.take(given, "compare", reads, default=("out", "plot"))
     rig = rig_from(model)
+    reading = take_reading(given)
     ensemble = Ensemble(**given)
     with outputs.progress("compare") as progress:
-        experiment = read_experiment(path, **take_reading(given))
+        experiment = read_experiment(path, **reading)
         comparison = compare(rig, experiment, ensemble=ensemble, threads=threads, progress=progress)
     written = outputs.write(comparison, keep=True)
     more = {"model": str(model), "simd": instruction_set()}

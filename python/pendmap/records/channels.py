@@ -161,7 +161,8 @@ def _example(places: Mapping[str, int], table: Table, where: str, *, timed: bool
     first = next((k for k in columns if in_order(table.values[:, k])), None)
     time = places.get("time", None if timed else first)
     free = [k for k in columns if k != time and changes(table.values[:, k])]
-    angle = min(free, key=lambda k: _roughness(table.values[:, k]), default=None)
+    rough = {k: _roughness(table.values[:, k]) for k in free}
+    angle = next((k for k in free if rough[k] <= 2 * min(rough.values())), None)
     known: dict[str, int | None] = {c: places[c] for c in ("angle", "velocity") if c in places}
     given = {"time": time} | (known or {"angle": angle})
     numbers = {channel: place + 1 for channel, place in given.items() if place is not None}

@@ -353,7 +353,7 @@ def test_a_rate_gives_the_times_unless_a_column_has_them(tmp_path: Path) -> None
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        ([], "--rate 1000 or rate_hz = 1000"),
+        ([], "must be given, got 1, 2: pendmap look alone.txt --rate 100 --angle 1"),
         *((["--rate", rate], "rate") for rate in ("0", "-5", "1e12", "quick")),
     ],
 )
