@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from pendmap.cli.parse.model_options import rig_from
 from pendmap.cli.parse.options import argument, group, new_command, output_options, simd_option
-from pendmap.cli.parse.signature import options_of
+from pendmap.cli.parse.signature import options_of, reading_options, take_reading
 from pendmap.cli.show import Outputs, first_of_all
 from pendmap.errors import instruction_set
 
@@ -24,7 +24,8 @@ _ENSEMBLE = group("Ensemble", "--members 1000 --spread 0.02")
 @argument("model", "MODEL")
 @argument("path", "EXPERIMENT")
 @options_of("comparison.forced.Ensemble", "members spread seed", _ENSEMBLE)
-@options_of("comparison.experiment.compare", "threads rate=rate_hz")
+@options_of("comparison.experiment.compare", "threads")
+@reading_options
 @simd_option
 @output_options((".nc",), recording=False)
 def command(
@@ -32,7 +33,6 @@ def command(
     model: Path,
     path: Path,
     threads: int | None,
-    rate_hz: float | None,
     **given: Any,  # noqa: ANN401 (outputs, ensemble)
 ) -> None:
     """Simulate a MODEL beside every run of an EXPERIMENT.
@@ -51,9 +51,10 @@ def command(
     reads = [model, *files_of(path)]
     outputs = Outputs.take(given, "compare", reads, default=("out", "plot"))
     rig = rig_from(model)
+    reading = take_reading(given)
     ensemble = Ensemble(**given)
     with outputs.progress("compare") as progress:
-        experiment = read_experiment(path, rate_hz=rate_hz)
+        experiment = read_experiment(path, **reading)
         comparison = compare(rig, experiment, ensemble=ensemble, threads=threads, progress=progress)
     written = outputs.write(comparison, keep=True)
     more = {"model": str(model), "simd": instruction_set()}

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from pendmap.cli.parse import options
 from pendmap.cli.parse.model_options import rig_from
 from pendmap.cli.parse.options import argument, option
-from pendmap.cli.parse.signature import options_of
+from pendmap.cli.parse.signature import options_of, reading_options, take_reading
 from pendmap.cli.parse.types import EFFECT, FILE, REPORTS, output_file
 from pendmap.cli.show import Outputs, command_line, table
 from pendmap.errors import instruction_set, named
@@ -30,7 +30,7 @@ _FIT = options.group("Candidates", "--max-effects 1 --without magnet")
 @argument("path", "EXPERIMENT")
 @options_of(
     "diagnosis.diagnose.diagnose",
-    "model max_effects without rate=rate_hz",
+    "model max_effects without",
     _FIT,
     model=FILE,
     without=EFFECT,
@@ -41,6 +41,7 @@ _FIT = options.group("Candidates", "--max-effects 1 --without magnet")
     "Further candidates: [[formula]] of a .toml.",
     group=_FIT,
 )
+@reading_options
 @options.simd_option
 @option(
     "--report",
@@ -54,7 +55,6 @@ def command(
     path: Path,
     model: Path | None,
     formulas: Path | None,
-    rate_hz: float | None,
     **given: Any,  # noqa: ANN401 (outputs, candidates)
 ) -> None:
     """Find where a model and an experiment disagree, and which effect is missing.
@@ -82,7 +82,7 @@ def command(
     usual = ("model", "plot", "report", "rerun")
     outputs = Outputs.take(given, "diagnose", reads, default=usual, always=("model",))
     baseline = None if model is None else rig_from(model)
-    experiment = read_experiment(path, rate_hz=rate_hz)
+    experiment = read_experiment(path, **take_reading(given))
     with outputs.progress("diagnose") as progress:
         result = diagnose(experiment, model=baseline, effects=effects, progress=progress, **given)
     save = functools.partial(save_model, diagnosed_model(result, command_line()))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from pendmap.cli.parse import options
 from pendmap.cli.parse.options import argument, flag
-from pendmap.cli.parse.signature import options_of
+from pendmap.cli.parse.signature import options_of, reading_options, take_reading
 from pendmap.cli.parse.types import EFFECT, METHOD
 from pendmap.cli.show import Outputs, Written, command_line, first_of_all
 from pendmap.errors import InputError, instruction_set
@@ -25,11 +25,12 @@ if TYPE_CHECKING:
 @argument("path", "EXPERIMENT")
 @options_of(
     "identification.experiment.identify",
-    "method=methods effect=effects rate=rate_hz",
+    "method=methods effect=effects",
     options.group("Fit", "--effect quadratic_drag"),
     methods=METHOD,
     effects=EFFECT,
 )
+@reading_options
 @options.simd_option
 @options.output_options((".toml", ".nc"))
 @flag(
@@ -42,7 +43,6 @@ def command(
     path: Path,
     methods: tuple[str, ...],
     effects: tuple[str, ...],
-    rate_hz: float | None,
     verbose: bool,
     **given: Any,  # noqa: ANN401
 ) -> None:
@@ -60,7 +60,7 @@ def command(
     from pendmap.records import files_of, read_experiment
 
     outputs = Outputs.take(given, "identify", files_of(path), default=("model", "plot", "rerun"))
-    experiment = read_experiment(path, rate_hz=rate_hz)
+    experiment = read_experiment(path, **take_reading(given))
     with outputs.progress("identify") as progress:
         report = identify(experiment, methods=methods or None, effects=effects, progress=progress)
 

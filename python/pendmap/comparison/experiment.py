@@ -22,11 +22,14 @@ from pendmap.records import experiment_of, summary
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
+    from typing import Unpack
+
+    from numpy.typing import ArrayLike
 
     from pendmap.comparison.itinerary import Cycle, Steady
     from pendmap.files.saved import About
     from pendmap.formatting import Table
-    from pendmap.records import Experiment, Run
+    from pendmap.records import ByHand, Experiment, Run
     from pendmap.records.read import Records
 
 
@@ -114,12 +117,13 @@ class Comparison(Saved):
 
 def compare(  # noqa: PLR0913 (each is asked for by name)
     model: Rig,
-    records: Records | Sequence[Records],
+    records: Records | Sequence[Records] | ArrayLike,
+    theta: ArrayLike | None = None,
     *,
     ensemble: Ensemble | None = None,
-    rate_hz: float | None = None,
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
+    **by_hand: Unpack[ByHand],
 ) -> Comparison:
     """Compare a model with every run of an experiment.
 
@@ -137,16 +141,18 @@ def compare(  # noqa: PLR0913 (each is asked for by name)
     ----------
     model : Rig
         Model in SI units, from :func:`pendmap.load_model`.
-    records : path, DataFrame, Experiment, Run, or a sequence of these
+    records : path, DataFrame, Experiment, Run, or a sequence of these; array, shape (N,)
         As for :func:`pendmap.identify`; forced runs too.
+    theta : array, shape (N,), optional
+        Angles of one free decay, whose times are ``records``.
     ensemble : Ensemble, optional
         Number and spread of the initial states for a forced run.
-    rate_hz : float, optional
-        Sampling rate, Hz, of records without a column of times.
     threads : int, optional
         Number of threads; by default one per processor.
     progress : callable, optional
         Called repeatedly with the number of members done and in all, for each forced run.
+    **by_hand
+        How records are read: :class:`pendmap.records.ByHand`.
 
     Returns
     -------
@@ -169,13 +175,11 @@ def compare(  # noqa: PLR0913 (each is asked for by name)
     >>> rig = pendmap.Rig(w0=6.2, c_over_m=0.05, Tr=0.08)
     >>> decay = pendmap.simulate(rig, theta=1.0, velocity=0.0, t_eval=np.arange(0, 20, 0.02))
     >>> angle = decay.theta.values + np.random.default_rng(0).normal(0, 1e-3, decay.time.size)
-    >>> every = np.ones(angle.size, bool)
-    >>> run = pendmap.Run("a", "a.csv", "free", decay.time.values, angle, every)
-    >>> round(pendmap.compare(rig, run).runs[0].rms, 4)
+    >>> round(pendmap.compare(rig, decay.time, angle).runs[0].rms, 4)
     0.001
     """
     errors.check_type("model", model, Rig, "pendmap.load_model('model.toml') in SI")
-    experiment = experiment_of(records, rate_hz=rate_hz)
+    experiment = experiment_of(records, theta, **by_hand)
     ensemble = Ensemble() if ensemble is None else ensemble
     errors.check_type("ensemble", ensemble, Ensemble, "pendmap.Ensemble(members=400)")
     if threads is not None:

@@ -29,24 +29,28 @@ from pendmap.residuals.torque import Torque, outstanding_bins, residual_torque
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Sequence
+    from typing import Unpack
+
+    from numpy.typing import ArrayLike
 
     from pendmap.model import Formula, Rig
-    from pendmap.records import Experiment
+    from pendmap.records import ByHand, Experiment
     from pendmap.records.read import Records
 
 _FITS = 10  # Fits that are half of the work; a diagnosis makes 15 or more
 
 
 def diagnose(  # noqa: PLR0913 (each is asked for by name)
-    records: Records | Sequence[Records],
+    records: Records | Sequence[Records] | ArrayLike,
+    theta: ArrayLike | None = None,
     *,
     model: Rig | None = None,
     max_effects: int = 3,
     without: Collection[str] = (),
     effects: Sequence[Formula] = (),
     thresholds: Thresholds | None = None,
-    rate_hz: float | None = None,
     progress: Callable[[int, int], None] | None = None,
+    **by_hand: Unpack[ByHand],
 ) -> Discrepancy:
     """Find where a model and an experiment disagree, and which effects the model lacks.
 
@@ -56,8 +60,10 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
 
     Parameters
     ----------
-    records : path, DataFrame, Experiment, Run, or a sequence of these
+    records : path, DataFrame, Experiment, Run, or a sequence of these; array, shape (N,)
         As for :func:`pendmap.identify`; forced runs too.
+    theta : array, shape (N,), optional
+        Angles of one free decay, whose times are ``records``.
     model : Rig, optional
         The baseline, in SI; by default viscous damping and Coulomb friction.
     max_effects : int
@@ -68,10 +74,10 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
         Further candidates, treated like the library's effects.
     thresholds : Thresholds, optional
         Thresholds of all decisions.
-    rate_hz : float, optional
-        Sampling rate, Hz, of records without a column of times.
     progress : callable, optional
         Called with the number of steps done and the number of all steps.
+    **by_hand
+        How records are read: :class:`pendmap.records.ByHand`.
 
     Returns
     -------
@@ -94,13 +100,11 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
     >>> rig = pendmap.Rig(w0=6.2, c_over_m=0.05, Tr=0.08, effects=(drag,))
     >>> decay = pendmap.simulate(rig, theta=2.5, velocity=0.0, t_eval=np.arange(0, 15, 0.03))
     >>> angle = decay.theta.values + np.random.default_rng(0).normal(0, 1e-3, decay.time.size)
-    >>> every = np.ones(angle.size, bool)
-    >>> run = pendmap.Run("a", "a.csv", "free", decay.time.values, angle, every)
-    >>> found = pendmap.diagnose(run, max_effects=1)
+    >>> found = pendmap.diagnose(decay.time, angle, max_effects=1)
     >>> found.verdict, [effect.name for effect in found.effects]
     ('named', ['quadratic_drag'])
     """
-    experiment = experiment_of(records, rate_hz=rate_hz)
+    experiment = experiment_of(records, theta, **by_hand)
     formulas = checked_own(effects)
     check_whole("max_effects", max_effects, 0, 6)
     moved = in_rounds(progress, _FITS) or (lambda _done, _total: None)

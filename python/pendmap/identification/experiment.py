@@ -43,11 +43,12 @@ from pendmap.signal.robust import from_first
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
+    from typing import Unpack
 
     from numpy.typing import ArrayLike
 
     from pendmap.model import Effect
-    from pendmap.records import Experiment, Run
+    from pendmap.records import ByHand, Experiment, Run
     from pendmap.records.read import Records
 
 
@@ -74,8 +75,8 @@ def identify(  # noqa: PLR0913 (each is asked for by name)
     methods: Iterable[str] | None = None,
     start: Rig | None = None,
     effects: Sequence[Effect | str] = (),
-    rate_hz: float | None = None,
     progress: Callable[[int, int], object] | None = None,
+    **by_hand: Unpack[ByHand],
 ) -> IdentificationReport:
     """Identify natural frequency, viscous damping and Coulomb friction by several methods.
 
@@ -86,21 +87,21 @@ def identify(  # noqa: PLR0913 (each is asked for by name)
     Parameters
     ----------
     records : path, DataFrame, Experiment, Run, or a sequence of these; array, shape (N,)
-        Free decays of one rig: files, folders and DataFrames as for
-        :func:`pendmap.read_experiment`, or what it returns; with ``theta`` the times, s.
+        Free decays of one rig: files, folders, tables and arrays as for
+        :func:`pendmap.read_experiment`, or what it returns; with ``theta`` the times.
     theta : array, shape (N,), optional
-        Angles from the downward rest, rad, of one free decay.
+        Angles from the downward rest of one free decay.
     methods : iterable of str, optional
         Methods to apply, of :data:`pendmap.identification.METHODS`; by default all.
     start : Rig, optional
         Starting values and effects of the trajectory method; by default estimated from the record.
     effects : sequence of Effect or str
         Further effects, also by name, whose sizes the trajectory method fits.
-    rate_hz : float, optional
-        Sampling rate, Hz, of records without a column of times.
     progress : callable, optional
         Called with the numbers of steps done and in all: one for each method, the peaks and the
         table.
+    **by_hand
+        How records are read: :class:`pendmap.records.ByHand`.
 
     Returns
     -------
@@ -122,13 +123,12 @@ def identify(  # noqa: PLR0913 (each is asked for by name)
     Examples
     --------
     >>> import numpy as np
-    >>> import pandas as pd
     >>> import pendmap
     >>> rig = pendmap.Rig(w0=6.2, c_over_m=0.05, Tr=0.08)
     >>> time = np.arange(0, 30, 0.02)
     >>> decay = pendmap.simulate(rig, theta=2.0, velocity=0.0, t_eval=time)
     >>> angle = decay.theta.values + np.random.default_rng(0).normal(0, 1e-3, time.size)
-    >>> report = pendmap.identify(pd.DataFrame({"t_s": time, "theta_rad": angle}))
+    >>> report = pendmap.identify(time, angle)
     >>> report.to_dataframe().loc[["w0", "c_over_m", "Tr"], "value"].round(2).to_dict()
     {'w0': 6.2, 'c_over_m': 0.05, 'Tr': 0.08}
     >>> report.predict([0.0, 0.2]).round(2)
@@ -141,7 +141,7 @@ def identify(  # noqa: PLR0913 (each is asked for by name)
     >>> again.model == report.model
     True
     """
-    experiment = experiment_of(_as_records(records, theta), rate_hz=rate_hz)
+    experiment = experiment_of(records, theta, **by_hand)
     if start is not None:
         check_type("start", start, Rig, "pendmap.Rig(w0=6.2)")
     check_callable("progress", progress)
@@ -184,21 +184,6 @@ def identify(  # noqa: PLR0913 (each is asked for by name)
     report(next(done), steps)
     asked = tuple(effect if isinstance(effect, str) else effect.name for effect in effects)
     return IdentificationReport(experiment, run, peaks, results, joint, table, drag, asked)
-
-
-def _as_records(
-    records: Records | Sequence[Records] | ArrayLike, theta: ArrayLike | None
-) -> Records | Sequence[Records]:
-    """Return records, of times and angles as a DataFrame."""
-    if theta is None:
-        return records
-    import pandas as pd  # noqa: PLC0415 (deferred import)
-
-    columns = {"t_s": np.asarray(records), "theta_rad": np.asarray(theta)}
-    shapes = [values.shape for values in columns.values()]
-    if len(shapes[0]) != 1 or shapes[1] != shapes[0]:
-        raise InputError(f"times and theta must be of one shape (N,), got {shapes}")
-    return pd.DataFrame(columns)
 
 
 def _with_drag(joint: JointFit) -> JointFit | None:

@@ -3,8 +3,9 @@
 from pendmap.model.effects import Effect
 from pendmap.model.files import load_model, parse_model, save_model
 from pendmap.model.formula import Formula, load_formulas
-from pendmap.model.pendulum import PRESETS, Pendulum, effects_of, model_text
+from pendmap.model.pendulum import PRESETS, Pendulum, effects_of
 from pendmap.model.rig import Rig, without_dimensions
+from pendmap.model.tables import model_text
 from pendmap.units import Units
 
 __all__ = [

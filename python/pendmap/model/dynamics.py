@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import abc
-from typing import TYPE_CHECKING, Any
+import tomllib
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from pendmap.errors import InputError, core_errors, short_repr
+from pendmap.errors import InputError, check_type, core_errors, short_repr
+from pendmap.model.tables import model_arguments, model_text
 from pendmap.units import TIME, VELOCITY
 
 if TYPE_CHECKING:
@@ -38,6 +40,51 @@ class Dynamics(abc.ABC):
     def numbers(cls) -> tuple[str, ...]:
         """Return the names of the parameters that are numbers."""
         return tuple(name for name, kind in cls.__annotations__.items() if kind == "float")
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the model as the tables of its file: dicts, lists, numbers and texts.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If the notes are no tables for TOML.
+
+        Examples
+        --------
+        >>> import pendmap
+        >>> pendmap.Rig(w0=6.2, c_over_m=0.05).to_dict()["pendulum"]["c_over_m"]
+        0.05
+        """
+        return tomllib.loads(model_text(self))
+
+    @classmethod
+    def from_dict(cls, content: dict[str, Any]) -> Self:
+        """Return the model of :meth:`to_dict`, or of tables like those of a model file.
+
+        Parameters
+        ----------
+        content : dict
+            ``pendulum``, and if there are any ``effect``, ``formula``, ``covariance`` and
+            ``provenance``.
+
+        Raises
+        ------
+        InputError
+            As for :func:`pendmap.load_model`, or if it is a model of the other class.
+
+        Examples
+        --------
+        >>> import pendmap
+        >>> pendmap.Pendulum.from_dict({"pendulum": {"gamma": 0.2, "p": 0.6, "omega": 2}}).gamma
+        0.2
+        """
+        check_type("content", content, dict, "{'pendulum': {'w0': 6.2}}")
+        in_si, arguments = model_arguments(content, {})
+        of = getattr(cls, "of", None)
+        if in_si != (of is not None):
+            wanted = "without dimensions" if of is None else "in SI"
+            raise InputError(f"content must be a model {wanted}, got one of the other kind")
+        return (of or cls)(**arguments)
 
     def acceleration(self, t: ArrayLike, theta: ArrayLike, v: ArrayLike) -> Floats:
         """Return ``th''``, with all effects and friction.

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from pendmap.errors import InputError, check_type, named
 from pendmap.files import read_toml, whole_file
-from pendmap.model.pendulum import Pendulum, model_text
+from pendmap.model.pendulum import Pendulum
 from pendmap.model.rig import Rig
-from pendmap.model.tables import model_arguments
+from pendmap.model.tables import model_arguments, model_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

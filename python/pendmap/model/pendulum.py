@@ -8,12 +8,11 @@ import tomllib
 from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.errors import InputError, check_number, check_type, core_errors, short_repr
-from pendmap.files import toml_text
 from pendmap.model.covariance import misses
 from pendmap.model.dynamics import Dynamics
 from pendmap.model.effects import Effect, is_driven
 from pendmap.model.labels import LABELS, unit_of
-from pendmap.model.tables import EFFECT, FORMAT, check_notes, effects_in
+from pendmap.model.tables import effects_in, model_text
 from pendmap.units import NONDIMENSIONAL, Units
 
 if TYPE_CHECKING:
@@ -200,34 +199,6 @@ def attributes_of(
     facts = {"units": model.units.name} | numbers | bare | {"model": text} | angle
     ratio = misses(model.notes)
     return facts | ({"misses_record": ratio} if math.isfinite(ratio) else {})
-
-
-def model_text(model: Any) -> str:  # noqa: ANN401 (a Pendulum or a Rig)
-    """Return the text of a model file, which reads back as the same model.
-
-    Raises TypeError or ValueError for notes that a file cannot hold.
-    """
-    numbers = {name: getattr(model, name) for name in model.numbers()}
-    if numbers.get("Omega") == 0:
-        del numbers["Omega"]  # nothing is driven
-    if getattr(model, "given_stroke", None) is not None:
-        numbers["Y"] = model.given_stroke
-        del numbers["p"]
-    content: dict[str, Any] = {"format_version": FORMAT, "pendulum": numbers}
-    formulas = [effect.formula.table for effect in model.effects if effect.formula is not None]
-    if formulas:
-        content["formula"] = formulas
-    if model.effects:
-        content["effect"] = [_table(effect) for effect in model.effects]
-    check_notes(model.notes)
-    return toml_text(content | dict(model.notes))
-
-
-def _table(effect: Effect) -> dict[str, Any]:
-    """Return an effect as a table without empty keys."""
-    entries = {key: getattr(effect, key) for key in EFFECT}
-    entries["ci95"] = {name: list(bounds) for name, bounds in effect.ci95.items()} or None
-    return {key: value for key, value in entries.items() if value is not None}
 
 
 def effects_of(attributes: Mapping[Any, Any]) -> tuple[Effect, ...]:

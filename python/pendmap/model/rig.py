@@ -11,7 +11,8 @@ from pendmap.model import quantities
 from pendmap.model.dynamics import Dynamics
 from pendmap.model.effects import is_driven, library
 from pendmap.model.pendulum import Pendulum, attributes_of, checked_effects, title_of
-from pendmap.model.quantities import COUNTERPARTS, SI_KEYS
+from pendmap.model.quantities import COUNTERPARTS, GROUPS, SI_KEYS
+from pendmap.model.tables import model_arguments
 from pendmap.units import Units
 
 if TYPE_CHECKING:
@@ -151,6 +152,28 @@ class Rig(Dynamics):
         check_keys("", given, SI_KEYS)
         numbers, stroke = quantities.resolve(given), quantities.stroke_of(given)
         return cls(**numbers, effects=effects, notes=notes or {}, given_stroke=stroke)
+
+    def driven(self, **drive: float) -> Rig:
+        """Return the rig with another drive; what is not given stays.
+
+        Parameters
+        ----------
+        **drive : float
+            ``p``, ``Y`` (amplitude of the pivot's motion, m) or ``stroke_mm`` (the same in mm);
+            ``Omega`` or ``frequency_hz``; ``phi``.
+
+        Raises
+        ------
+        InputError
+            As for :meth:`of`.
+
+        Examples
+        --------
+        >>> round(Rig(w0=6.2).driven(stroke_mm=20, frequency_hz=1.9).p, 4)
+        0.2906
+        """
+        check_keys("", drive, (*GROUPS["p"], *GROUPS["Omega"], "phi"))
+        return type(self).of(**model_arguments(self.to_dict(), drive)[1])
 
     @classmethod
     def from_pendulum(cls, pendulum: Pendulum, w0: float) -> Rig:

@@ -14,6 +14,7 @@ from pendmap.errors import (
     short_repr,
     shown_key,
 )
+from pendmap.files import toml_text
 from pendmap.model import quantities
 from pendmap.model.covariance import without
 from pendmap.model.effects import Effect, is_driven
@@ -143,3 +144,31 @@ def effects_in(content: Mapping[str, Any]) -> tuple[Effect, ...]:
             others = f", and this file's [[formula]] are {', '.join(formulas)}" if unknown else ""
             raise InputError(f"{where}: {error}{others}") from None
     return tuple(effects)
+
+
+def model_text(model: Any) -> str:  # noqa: ANN401 (a Pendulum or a Rig)
+    """Return the text of a model file, which reads back as the same model.
+
+    Raises TypeError or ValueError for notes that a file cannot hold.
+    """
+    numbers = {name: getattr(model, name) for name in model.numbers()}
+    if numbers.get("Omega") == 0:
+        del numbers["Omega"]  # nothing is driven
+    if getattr(model, "given_stroke", None) is not None:
+        numbers["Y"] = model.given_stroke
+        del numbers["p"]
+    content: dict[str, Any] = {"format_version": FORMAT, "pendulum": numbers}
+    formulas = [effect.formula.table for effect in model.effects if effect.formula is not None]
+    if formulas:
+        content["formula"] = formulas
+    if model.effects:
+        content["effect"] = [_table(effect) for effect in model.effects]
+    check_notes(model.notes)
+    return toml_text(content | dict(model.notes))
+
+
+def _table(effect: Effect) -> dict[str, Any]:
+    """Return an effect as a table without empty keys."""
+    entries = {key: getattr(effect, key) for key in EFFECT}
+    entries["ci95"] = {name: list(bounds) for name, bounds in effect.ci95.items()} or None
+    return {key: value for key, value in entries.items() if value is not None}

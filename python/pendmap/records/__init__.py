@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from pendmap.records.experiment import Experiment, Finding, Run, Segment
 from pendmap.records.noise import NoiseFloor, noise_floor
+from pendmap.records.overrides import ByHand
 from pendmap.records.read import experiment_of, files_of, read_experiment
 
 __all__ = [
+    "ByHand",
     "Experiment",
     "Finding",
     "NoiseFloor",

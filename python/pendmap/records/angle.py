@@ -10,6 +10,7 @@ import numpy as np
 
 from pendmap.errors import InputError
 from pendmap.formatting import counted
+from pendmap.records.by_hand import by_hand
 from pendmap.records.noise import noise_of
 from pendmap.records.rod_sensors import FEWEST_PEAKS, PLACE_EXAMPLE, angle_of_rate
 from pendmap.signal.half_cycles import swings
@@ -60,7 +61,10 @@ def _finite(work: Work, what: str, *values: Floats) -> Finding | None:
     """Remove rows in which a required channel has no number."""
     good = np.all([np.isfinite(v) for v in values], axis=0)
     if good.size and not good.any():
-        raise InputError(f"{work.where}: the {what} must be numbers, no row has a number for it")
+        raise InputError(
+            f"{work.where}: the {what} must be numbers, no row has a number for it"
+            f"{work.other('angle')}"
+        )
     finding = work.leave_out(~good, "angle-missing", "row", channel=what)
     work.refuse_short()
     return finding
@@ -108,7 +112,7 @@ def _placed(work: Work) -> Accelerometer:
         return sensor
     raise InputError(
         f"{work.where}: {why}, or the record must also have an angle, a velocity (gyroscope)"
-        " or pixel_x and pixel_y"
+        f" or pixel_x and pixel_y{work.other('angle')}"
     )
 
 
@@ -175,7 +179,10 @@ def _circle_angle(work: Work, x: Floats, y: Floats) -> Finding:
     middle = np.array([np.median(x), np.median(y)])
     size = float(np.hypot(np.ptp(x), np.ptp(y)))
     if not size or not math.isfinite(size):
-        raise InputError(f"{work.where}: pixel_x and pixel_y must show a swing, they do not move")
+        raise InputError(
+            f"{work.where}: pixel_x and pixel_y must show a swing, they do not move"
+            f"{work.other('angle')}"
+        )
     u, v = (x - middle[0]) / size, (y - middle[1]) / size
     # Initial circle: Kasa's algebraic fit, by least squares of u^2 + v^2.
     columns = np.column_stack([u, v, np.ones(u.size)])
@@ -198,7 +205,7 @@ def _circle_angle(work: Work, x: Floats, y: Floats) -> Finding:
     if not (math.isfinite(radius) and 0 < radius < 1e3):
         raise InputError(
             f"{work.where}: pixel_x and pixel_y must be positions of a bob on a circle,"
-            " they lie on none"
+            f" they lie on none{work.other('angle')}"
         )
     speed = np.hypot(np.gradient(u, work.time), np.gradient(v, work.time))
     quick = speed >= np.quantile(speed, 0.8)
@@ -224,7 +231,8 @@ def missing(work: Work) -> Finding | None:
         largest = float(np.nanmax(np.abs(work.theta)))
         raise InputError(
             f"{work.where}: angles must be up to {LARGEST_ANGLE:g} rad, got {largest:.3g} rad, too"
-            " large for a pendulum; a scale can be given in [columns] of experiment.toml"
+            " large for a pendulum, as counts of 4096 a turn would be:"
+            f" {by_hand(work.where, angle_scale=math.tau / 4096)}"
         )
     return _finite(work, "angle", np.where(huge, math.nan, work.theta))
 

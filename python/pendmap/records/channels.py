@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 import re
 from typing import TYPE_CHECKING, Final
 
@@ -54,7 +55,7 @@ def channels_of(  # noqa: C901 (a step each)
         name = column.name or CHANNELS[channel].default
         # Without a name it gives unit, scale or zero of a column that is found by its usual names.
         if column.name is not None or name in table.names:
-            places[channel] = _place(name, table, f"{where}: [columns]: {channel}")
+            places[channel] = _place(name, table, f"{where}: {channel}")
     for channel, kind in CHANNELS.items():
         if channel in places or kind.default not in table.names:
             continue
@@ -62,9 +63,14 @@ def channels_of(  # noqa: C901 (a step each)
         # [columns] may say that theta_rad holds turning points: then it holds no angles.
         if channel != "angle" or place != places.get("peaks"):
             places[channel] = place
+    # A channel without a column is none that is looked for.
+    places |= {channel: -1 for channel, column in asked.items() if column.unused}
     rate, known = description.rate_hz, description.known
     findings = use_pixels(table, places, asked)
     findings += guess(table, places, timed=rate is None)
+    places = {channel: place for channel, place in places.items() if place >= 0}
+    if rate and "time" in places and not in_order(table.values[:, places["time"]]):
+        del places["time"]
     values, heads = {}, {}
     if rate and "time" not in places:
         values["time"], heads["time"] = table.order / rate, f"{rate:g} readings a second"
@@ -113,6 +119,7 @@ def channels_of(  # noqa: C901 (a step each)
         findings=[*table.findings, *findings],
         columns=heads,
         unused=unused,
+        places=places,
         accelerometer=sensor,
         place_missing=missing,
         edge=asked.get("trigger", Column()).edge,
@@ -120,39 +127,34 @@ def channels_of(  # noqa: C901 (a step each)
     )
 
 
-def _place(name: str, table: Table, where: str) -> int:
-    """Return the index of a column by its heading, with or without the unit."""
+def _place(name: str | int, table: Table, where: str) -> int:
+    """Return the index of a column by its number or its heading, with or without the unit."""
+    if isinstance(name, int) and name <= len(table.names):
+        return name - 1
     if name in table.names:
         return table.names.index(name)
     bare = [name_and_unit(head)[0] for head in table.names]
-    if bare.count(name) == 1:
-        return bare.index(name)
-    if not any(table.names):
-        raise InputError(f"{where}: {short_repr(name)}: the file has no line of names")
-    near = difflib.get_close_matches(name, table.names, 1, 0.6)
+    if bare.count(str(name)) == 1:
+        return bare.index(str(name))
+    near = difflib.get_close_matches(str(name), table.names, 1, 0.6)
     perhaps = f", perhaps {near[0]!r} is meant" if near else ""
-    raise InputError(
-        f"{where}: no column {short_repr(name)}{perhaps}: it must be one of {_names(table)}"
-    )
+    raise InputError(f"{where} must be one of {_names(table)}, got {short_repr(name)}{perhaps}")
 
 
 def _names(table: Table) -> str:
-    """Return the headings of a table for a message."""
-    return listed([repr(name[:40] or "(no name)") for name in table.names], _MOST_NAMED)
+    """Return the numbers and headings of a table for a message."""
+    names = [f"{k} {name[:40]!r}" if name else str(k) for k, name in enumerate(table.names, 1)]
+    return listed(names, _MOST_NAMED)
 
 
 def _check(places: dict[str, int], table: Table, where: str, *, timed: bool) -> None:
     """Raise InputError for a table without times or angles, or a column with two channels."""
-    advice = "experiment.toml names others in [columns]"
-    if "time" not in places and not timed:
+    timed = timed or "time" in places
+    if not (timed and any(channel in places for channel in ANGLE_CHANNELS)):
+        what, wanted = ("angles", "one") if timed else ("times", "one, or the rate in Hz,")
         raise InputError(
-            f"{where}: no column of times: there must be one like t_s, or a rate: --rate 1000 or"
-            f" rate_hz = 1000 in [columns] of experiment.toml (Hz); got columns {_names(table)}"
-        )
-    if not any(channel in places for channel in ANGLE_CHANNELS):
-        raise InputError(
-            f"{where}: no column of angles: there must be theta_rad or one like it; there are"
-            f" {_names(table)}; {advice}"
+            f"{where}: no column of {what}: {wanted} must be given, got {_names(table)}:"
+            f" {_example(places, table, where, timed=timed)}"
         )
     for one, other in (("time", "angle"), ("pixel_x", "pixel_y")):
         if one in places and places[one] == places.get(other):
@@ -160,6 +162,33 @@ def _check(places: dict[str, int], table: Table, where: str, *, timed: bool) -> 
             raise InputError(f"{where}: {one} and {other} must be two columns, both are {name!r}")
     if ("pixel_x" in places) != ("pixel_y" in places):
         raise InputError(f"{where}: both or neither of pixel_x and pixel_y must be given, got one")
+
+
+def _example(places: Mapping[str, int], table: Table, where: str, *, timed: bool) -> str:
+    """Return the command that reads the columns that are like times and angles."""
+    columns = range(len(table.names))
+    first = next((k for k in columns if in_order(table.values[:, k])), None)
+    time = places.get("time", None if timed else first)
+    free = [k for k in columns if k != time and changes(table.values[:, k])]
+    rough = {k: _roughness(table.values[:, k]) for k in free}
+    angle = next((k for k in free if rough[k] <= 2 * min(rough.values())), None)
+    known: dict[str, int | None] = {c: places[c] for c in ("angle", "velocity") if c in places}
+    given = {"time": time} | (known or {"angle": angle})
+    numbers = {channel: place + 1 for channel, place in given.items() if place is not None}
+    return by_hand(where, **({} if timed or "time" in numbers else {"rate_hz": 100}), **numbers)
+
+
+def _roughness(values: Floats) -> float:
+    """Return the mean second difference of numbers over their range; infinite if in order."""
+    good = values[np.isfinite(values)]
+    bend = np.abs(np.diff(good, 2))
+    return math.inf if in_order(values) or not bend.size else float(bend.mean() / np.ptp(good))
+
+
+def in_order(values: Floats) -> bool:
+    """Return whether numbers never fall, and rise."""
+    steps = np.diff(values[np.isfinite(values)])
+    return bool(np.any(steps > 0) and np.all(steps >= 0))
 
 
 def _in_si(  # noqa: PLR0913, PLR0917 (what is known of the column)

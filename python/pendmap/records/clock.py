@@ -11,6 +11,7 @@ import numpy as np
 
 from pendmap.errors import InputError
 from pendmap.formatting import Estimate, counted, estimate_text, listed, moment
+from pendmap.records.by_hand import by_hand
 from pendmap.records.resolution import FEWEST_EDGES, logs_edges, spread_stamps
 from pendmap.records.slips import slips_of
 from pendmap.records.work import FEWEST_SAMPLES
@@ -35,7 +36,10 @@ def missing(work: Work) -> Finding | None:
     """Remove rows without a time; InputError if no row has one."""
     bad = ~np.isfinite(work.time)
     if bad.all():
-        raise InputError(f"{work.where}: the times must be numbers, got no row with a time")
+        raise InputError(
+            f"{work.where}: the times must be numbers, got no row with a time:"
+            f" {by_hand(work.where, rate_hz=100)}"
+        )
     finding = work.leave_out(bad, "time-missing", "row")
     if work.time.size < 2:
         work.refuse_short()
@@ -227,7 +231,8 @@ def unordered(work: Work) -> Finding | None:
     if np.mean(false) > MOST_UNORDERED:
         raise InputError(
             f"{work.where}: the times must be in order, {np.sum(false)} of {false.size} are out"
-            " of order, and sorted by time the angles are no smooth motion"
+            " of order, and sorted by time the angles are no smooth motion:"
+            f" {by_hand(work.where, rate_hz=100)}"
         )
     return work.leave_out(false, "time-backwards.left-out", "time stamp")
 
@@ -254,7 +259,10 @@ def _smoother(theta: Floats, at: Indices) -> bool:
 def gaps(work: Work) -> Finding | None:
     """Report gaps, and uneven or jittering intervals; InputError for times that do not increase."""
     if work.time.size < 2 or not work.time[-1] > work.time[0]:
-        raise InputError(f"{work.where}: the times must be in order, they do not increase")
+        raise InputError(
+            f"{work.where}: the times must be in order, they do not increase:"
+            f" {by_hand(work.where, rate_hz=100)}"
+        )
     steps, intervals = np.diff(work.time), intervals_of(work.time)
     usual, at = intervals.tick, intervals.gaps
     if at.size > steps.size / 4:
@@ -284,18 +292,21 @@ def no_clock(work: Work) -> None:
         work.findings = [finding for finding in work.findings if finding.what not in SPACING]
 
 
-def cut(work: Work) -> None:
+def cut(work: Work) -> Finding | None:
     """Keep the samples between ``from_s`` and ``to_s`` of the description."""
     low, high = work.plan.from_s, work.plan.to_s
     first, last = float(work.time[0]), float(work.time[-1])
     if low <= first and last <= high:
-        return
+        return None
     work.keep((work.time >= low) & (work.time <= high))
     if work.time.size < FEWEST_SAMPLES:
         raise InputError(
             f"{work.where}: from_s and to_s must be times within {first:g} to {last:g} s, they"
-            f" leave {counted(work.time.size, 'sample')}"
+            f" leave {counted(work.time.size, 'sample')}:"
+            f" {by_hand(work.where, from_s=first, to_s=last)}"
         )
+    samples, low, high = counted(work.time.size, "sample"), max(low, first), min(high, last)
+    return work.finding("cut", samples=samples, begin=moment(low), end=moment(high))
 
 
 def pause(work: Work) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import math
+import re
 from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar
 
 from pendmap.errors import (
@@ -15,16 +16,13 @@ from pendmap.errors import (
     check_flag,
     check_number,
     check_whole,
-    named,
     short_repr,
     shown_key,
 )
-from pendmap.files import read_toml
 from pendmap.records.units import ANGULAR_ACCELERATIONS, CHANNELS, PIVOT_UNITS, spelling
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
-    from pathlib import Path
 
 T = TypeVar("T")
 Kind = Literal["free", "forced"]
@@ -34,6 +32,8 @@ NAME: Final = "experiment.toml"
 RATE: Final = "rate_hz"
 LARGEST: Final = 1e12  # Greatest magnitude of a number in a description
 NUMBER: Final = (-LARGEST, LARGEST)
+COUNTS: Final = re.compile("counts?|ticks?", re.IGNORECASE)
+COLUMN: Final = object()  # Rule of a heading, or of the number of a column from 1
 POSITIVE: Final = (1 / LARGEST, LARGEST)
 RATES: Final = (1e-3, 1e9)  # Sampling rates, Hz
 
@@ -57,7 +57,8 @@ class Rig:
 class Column:
     """Column of a channel; position of an accelerometer, edge of a trigger."""
 
-    name: str | None = _key(str)
+    name: str | int | None = _key(COLUMN)  # heading, or number from 1
+    unused: bool = _key(bool, default=False)  # no column has this channel
     unit: str | None = _key(str)
     scale: float | None = _key(NUMBER)  # SI unit per unit of the column
     zero: float = _key(NUMBER, 0.0)  # in the unit of the column
@@ -136,15 +137,8 @@ class Description:
     runs: tuple[RunPlan, ...] = ()
 
 
-def read_description(path: Path) -> Description:
-    """Read an ``experiment.toml``; raise InputError, with the path, for invalid content."""
-    content = read_toml(path)
-    with named(str(path)):
-        return _description(content)
-
-
-def _description(content: dict[str, Any]) -> Description:
-    """Return the checked description from the file's tables."""
+def description_of(content: dict[str, Any]) -> Description:
+    """Return the checked description from its tables; raise InputError for invalid ones."""
     _refuse_unknown(
         content, ("rig", "columns", "reader", "run"), "", "[rig], [columns], [reader] and [[run]]"
     )
@@ -155,10 +149,15 @@ def _description(content: dict[str, Any]) -> Description:
     columns = _table("[columns]", content.get("columns", {}))
     _refuse_unknown(columns, (*CHANNELS, RATE), "[columns]")
     rig = dataclasses.asdict(_parsed(Rig, "[rig]", content.get("rig", {})))
+    counts = rig["encoder_counts"] is not None
     reader = _reader(content.get("reader", {}))
     return Description(
         {name: value for name, value in rig.items() if value is not None},
-        {name: _column(name, value) for name, value in columns.items() if name != RATE},
+        {
+            name: _column(name, value, counts=counts)
+            for name, value in columns.items()
+            if name != RATE
+        },
         checked(f"[columns]: {RATE}", columns[RATE], RATES) if RATE in columns else None,
         reader,
         plans,
@@ -205,6 +204,8 @@ def checked(name: str, value: object, rule: Any) -> Any:  # noqa: ANN401 (of any
     """Return a value that is of a type, a dataclass, in a range, or one of a list."""
     if isinstance(rule, type) and dataclasses.is_dataclass(rule):
         return _parsed(rule, name, value)
+    if rule is COLUMN:
+        rule = str if isinstance(value, str) else range(1, 1001)
     if rule is bool:
         return check_flag(name, value)
     if isinstance(rule, range):
@@ -238,15 +239,17 @@ def _reader(value: object) -> Reader:
     return reader
 
 
-def _column(channel: str, value: object) -> Column:
+def _column(channel: str, value: object, *, counts: bool) -> Column:
     """Return the checked column of a channel."""
     where = f"[columns]: {channel}"
-    value = {"name": value} if isinstance(value, str) else value
+    value = {"name": value} if isinstance(value, str | int) else value
     others = [key for key, only in ONLY_OF.items() if only != channel]
     column = _parsed(Column, where, value, others)
     if column.scale == 0:
         raise InputError(f"{where}: scale must be any number but 0, got 0")
     if column.unit is None or column.scale is not None:
+        return column
+    if counts and channel == "angle" and COUNTS.fullmatch(column.unit):
         return column
     angular = spelling(column.unit) in ANGULAR_ACCELERATIONS
     if column.direction is not None and angular != (column.direction == "angular"):

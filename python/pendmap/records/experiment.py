@@ -8,12 +8,15 @@ import tomllib
 from importlib import resources
 from typing import TYPE_CHECKING, Any, Final
 
-from pendmap.errors import InputError
+from pendmap.errors import InputError, short_repr
+from pendmap.formatting import counted
 from pendmap.model.quantities import GRAVITY
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
     from pathlib import Path
+
+    import pandas as pd
 
     from pendmap.records.description import Kind
     from pendmap.records.rod_sensors import Accelerometer, Gyroscope
@@ -86,7 +89,7 @@ class Segment:
     used: bool
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, repr=False)
 class Run:
     """One record in SI, corrected if the correction is unambiguous.
 
@@ -166,6 +169,29 @@ class Run:
     sha256: str = ""
     clock_stderr: float = 0.0
 
+    def __repr__(self) -> str:
+        span = f"{self.time[0]:g} to {self.time[-1]:g} s" if self.time.size else "no time"
+        return f"<Run {self.name}: {self.kind}, {counted(self.time.size, 'sample')}, {span}>"
+
+    def _repr_html_(self) -> str:
+        return str(self.to_dataframe().to_html(max_rows=10))
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the samples.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Index ``t_s``; ``theta_rad``, the measured ones of ``velocity_rad_s`` and
+            ``acceleration_m_s2``, and ``trusted``.
+        """
+        import pandas as pd
+
+        further = {"velocity_rad_s": self.velocity, "acceleration_m_s2": self.acceleration}
+        columns = {"theta_rad": self.theta} | {k: v for k, v in further.items() if v is not None}
+        frame = pd.DataFrame(columns, index=pd.Index(self.time, name="t_s"))
+        return frame.assign(trusted=self.trusted)
+
     @property
     def moves(self) -> bool:
         """Whether any sample is for fitting."""
@@ -195,9 +221,9 @@ class Run:
         return 1 / intervals_of(self.time).tick if self.time.size > 1 else 0.0
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, repr=False)
 class Experiment:
-    """Runs of one rig.
+    """Runs of one rig; a collection of them, ``experiment["run_00"]`` by name or by number.
 
     Parameters
     ----------
@@ -218,6 +244,50 @@ class Experiment:
     known: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
     sha256: Mapping[str, str] = dataclasses.field(default_factory=dict)
+
+    def __iter__(self) -> Iterator[Run]:
+        return iter(self.runs)
+
+    def __len__(self) -> int:
+        return len(self.runs)
+
+    def __getitem__(self, name: str | int) -> Run:
+        if not isinstance(name, str):
+            return self.runs[name]
+        runs = {run.name: run for run in self.runs}
+        if name not in runs:
+            raise InputError(f"run must be one of {', '.join(runs)}, got {short_repr(name)}")
+        return runs[name]
+
+    def __repr__(self) -> str:
+        free = sum(run.kind == "free" for run in self.runs)
+        return f"<Experiment {self.path.name}: {counted(len(self), 'run')}, {free} free>"
+
+    def _repr_html_(self) -> str:
+        return str(self.to_dataframe().to_html())
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return one row a run.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Index ``name``; ``kind``, numbers of ``samples`` and of those for fitting, ``trusted``,
+            ``rate_hz``, ``from_s``, ``to_s``, and the keys of its ``findings``.
+        """
+        import pandas as pd
+
+        columns = {
+            "name": [run.name for run in self],
+            "kind": [run.kind for run in self],
+            "samples": [run.time.size for run in self],
+            "trusted": [int(run.trusted.sum()) for run in self],
+            "rate_hz": [run.rate_hz for run in self],
+            "from_s": [run.time[0] for run in self],
+            "to_s": [run.time[-1] for run in self],
+            "findings": [", ".join(finding.what for finding in run.findings) for run in self],
+        }
+        return pd.DataFrame(columns).set_index("name")
 
     @property
     def w0(self) -> float | None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from pendmap.errors import InputError
 from pendmap.formatting import counted, listed, moment
+from pendmap.records.by_hand import by_hand
 from pendmap.records.experiment import Segment
 from pendmap.records.releases import enough, releases
 from pendmap.records.rod_sensors import gyroscope_of
@@ -34,7 +35,9 @@ def moves(work: Work) -> Finding | None:
     low, high = float(work.time[0]), float(work.time[-1])
     work.segments = [Segment("motion", low, high, used=True)]
     if np.ptp(work.theta) == 0:
-        raise InputError(f"{work.where}: must be a motion, the angle never changes")
+        raise InputError(
+            f"{work.where}: must be a motion, the angle never changes{work.other('angle')}"
+        )
     _measure_noise(work)
     good = work.theta[work.trusted]
     spread = float(np.ptp(good)) if good.size else 0.0
@@ -145,10 +148,12 @@ def used_motions(work: Work) -> Finding | None:
     taken = [text for text, use in zip(spans, used, strict=True) if use]
     short = [text for text, use in zip(spans, used, strict=True) if not use]
     if work.angle_source is not None and len(taken) > 1:
+        low, high = work.releases[0]
+        span_of = {"from_s": float(work.time[low]), "to_s": float(work.time[high - 1])}
         raise InputError(
             f"{work.where}: an acceleration without an angle must be of one release, got"
-            f" {len(taken)}, of {listed(taken, MOST_LISTED)}: from_s and to_s in [[run]] of"
-            " experiment.toml choose one, or an angle or a velocity (gyroscope) must be recorded"
+            f" {len(taken)}, of {listed(taken, MOST_LISTED)}; an angle or a velocity (gyroscope)"
+            f" must be recorded too, or one release chosen: {by_hand(work.where, **span_of)}"
         )
     _settle(work, used, span)
     if len(used) < 2:

@@ -7,32 +7,44 @@ import os
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
-from pendmap.errors import InputError, short_repr
+from pendmap.errors import InputError, named, short_repr
+from pendmap.files import read_toml
 from pendmap.formatting import counted, listed
 from pendmap.records.across import checked_together
+from pendmap.records.by_hand import FRAME, GIVEN
 from pendmap.records.channels import channels_of
-from pendmap.records.description import NAME, RATES, Description, RunPlan, checked, read_description
+from pendmap.records.description import NAME, Description, RunPlan, description_of
 from pendmap.records.experiment import Experiment, Finding, Run, finding_of
 from pendmap.records.formats import TABLES, read_table
+from pendmap.records.frames import frame_of
+from pendmap.records.overrides import ByHand, by_option, name_columns, override, refuse_unused
 from pendmap.records.rod_sensors import gyroscope_of
 from pendmap.records.rules import OF_RELEASE, RULES, apply
-from pendmap.records.tables import is_frame, table_of
+from pendmap.records.tables import table_of
 
 if TYPE_CHECKING:
-    import pandas as pd
+    from typing import Unpack
 
+    import pandas as pd
+    import xarray as xr
+    from numpy.typing import ArrayLike
+
+    from pendmap.records.overrides import Taken
     from pendmap.records.text import Table
     from pendmap.records.work import Work
 
-    Records: TypeAlias = Experiment | Run | pd.DataFrame | str | os.PathLike[str]
+    Frame: TypeAlias = pd.DataFrame | pd.Series | xr.Dataset | xr.DataArray
+    Records: TypeAlias = Experiment | Run | Frame | str | os.PathLike[str]
 
 _FORMS: Final = (
-    "paths, DataFrames with columns like t_s and theta_rad, an Experiment like"
-    " pendmap.read_experiment('folder'), Runs or a list of them"
+    "paths, arrays t and theta, DataFrames or xarray with columns like t_s and theta_rad, an"
+    " Experiment like pendmap.read_experiment('folder'), Runs or a list of them"
 )
-FRAME: Final = "DataFrame"  # Name of a record that has no file
+_NO_RECORD: Final = (
+    f"{{place}}: has no {NAME}: there must be one, or files that are records, got {{got}}"
+)
 _SHOWN: Final = 3  # Names of records in the name of several together
 
 
@@ -46,31 +58,34 @@ def files_of(path: str | os.PathLike[str]) -> list[Path]:
     if not place.is_dir():
         return [place]
     description = [place / NAME] if (place / NAME).is_file() else []
-    return description + [
-        place / file for file in dict.fromkeys(plan.file for plan in _planned(place).runs)
-    ]
+    plans = _described(place, _tables_of(place)).runs
+    return description + [place / file for file in dict.fromkeys(plan.file for plan in plans)]
 
 
 def read_experiment(
-    path: str | os.PathLike[str] | pd.DataFrame, *, rate_hz: float | None = None
+    path: str | os.PathLike[str] | Frame | ArrayLike,
+    theta: ArrayLike | None = None,
+    **by_hand: Unpack[ByHand],
 ) -> Experiment:
     """Read a record or a folder of records, and report its faults.
 
-    A file (CSV, other text, Parquet, Excel) or a DataFrame with a time and an angle is an
-    experiment of one free decay. A folder is an experiment with an ``experiment.toml``; without it
-    each file is a free decay. Each free release of a file is one run, named ``decay 1/3``. Nothing
-    is written. Each fault is a finding under a stable key. Data are corrected only where the
-    correction is unambiguous: wrapped turns are unwrapped, milliseconds become seconds.
-    ``Run.trusted`` marks the samples for fitting.
+    A file (CSV, other text, Parquet, Excel), a table in memory or two arrays with a time and an
+    angle are an experiment of one free decay. A folder is an experiment with an
+    ``experiment.toml``; without it each file is a free decay. Each free release of a file is one
+    run, named ``decay 1/3``. Nothing is written. Each fault is a finding under a stable key. Data
+    are corrected only where the correction is unambiguous: wrapped turns are unwrapped,
+    milliseconds become seconds. ``Run.trusted`` marks the samples for fitting.
 
     Parameters
     ----------
-    path : str, path or pandas.DataFrame
-        File or folder; or the columns themselves, named as in a file, such as ``t_s`` and
-        ``theta_rad``. An index of dates, or one with a name, is a column too.
-    rate_hz : float, optional
-        Sampling rate, Hz, of records without a column of times: ``t = k / rate_hz``. It overrides
-        ``rate_hz`` of [columns].
+    path : str, path, array, DataFrame, Series, or Dataset or DataArray of xarray
+        File or folder; or columns named as in a file, such as ``t_s`` and ``theta_rad``, also an
+        index of dates or one with a name; of xarray what stands along the longest dimension, in the
+        unit of the attribute ``units``. With ``theta`` the times, shape (N,), s or dates.
+    theta : array, shape (N,), optional
+        Angles from the downward rest, rad; a name of the array may have another unit.
+    **by_hand
+        Columns, units, clock and span: :class:`pendmap.records.ByHand`, of every file of a folder.
 
     Returns
     -------
@@ -92,38 +107,68 @@ def read_experiment(
     >>> theta = 0.5 * np.exp(-0.02 * time) * np.cos(6.2 * time)
     >>> rows = np.column_stack((time, theta))
     >>> np.savetxt("run.csv", rows, delimiter=",", header="t_s,theta_rad", comments="")
-    >>> pendmap.read_experiment("run.csv").runs[0].theta.size
+    >>> pendmap.read_experiment("run.csv")
+    <Experiment run.csv: 1 run, 1 free>
+    >>> pendmap.read_experiment(time, np.degrees(theta), angle_unit="deg").runs[0].theta.size
     2000
     """
-    rate = None if rate_hz is None else checked("rate_hz", rate_hz, RATES)
-    if isinstance(path, str | os.PathLike):
+    return read_described(path, theta, by_hand)[0]
+
+
+def read_described(
+    path: object, theta: object, by_hand: ByHand
+) -> tuple[Experiment, dict[str, Any]]:
+    """Return :func:`read_experiment`, and the tables with which its folder is read in this way."""
+    if unknown := by_hand.keys() - ByHand.__annotations__.keys():
+        raise TypeError(f"got an unexpected keyword argument {unknown.pop()!r}")
+    given = {name: value for name, value in by_hand.items() if value is not None}
+    frame, taken = frame_of(path, theta), dict[str, dict[str, str | int]]()
+    if frame is not None:
+        place, content = Path(FRAME), _free_decays([FRAME])
+        given = given if theta is None else {"time": 1, "angle": 2} | given
+    elif isinstance(path, str | os.PathLike):
         place = Path(path)
-        planned = _planned(place)
-        planned = dataclasses.replace(planned, rate_hz=rate or planned.rate_hz)
-        runs, findings = _every(place, planned)
+        content = _tables_of(place)
     else:
-        if not is_frame(path):
-            raise InputError(f"path must be a path or a DataFrame, got {short_repr(path)}")
-        place, planned = Path(FRAME), Description(rate_hz=rate)
-        tables = {FRAME: (table_of(path, FRAME), "")}
-        runs, findings = _runs(place, RunPlan(FRAME), planned, tables, FRAME)
+        wanted = "a path, a table of pandas or xarray, or times with theta beside them"
+        raise InputError(f"path must be {wanted}, got {short_repr(path)}")
+    described = (place / NAME).is_file() and frame is None
+    GIVEN.set((str(place) if described else "", tuple(given.items())))
+    planned = _described(place, content)
+    if given:
+        override(content, given)
+        try:
+            planned = description_of(content)
+        except InputError as error:
+            raise InputError(by_option(str(error))) from None
+    if frame is None:
+        runs, findings = _every(place, planned, taken)
+    else:
+        tables = {FRAME: (table_of(frame, FRAME), "")}
+        runs, findings = _runs(place, planned.runs[0], planned, tables, FRAME, taken)
     digests = {run.file: run.sha256 for run in runs if run.sha256}
     unique, together = checked_together(runs)
-    return Experiment(place, unique, planned.known, (*findings, *together), digests)
+    experiment = Experiment(place, unique, planned.known, (*findings, *together), digests)
+    name_columns(content, taken)
+    return experiment, content
 
 
 def experiment_of(
-    records: Records | Sequence[Records], *, rate_hz: float | None = None
+    records: Records | Sequence[Records] | ArrayLike,
+    theta: ArrayLike | None = None,
+    **by_hand: Unpack[ByHand],
 ) -> Experiment:
     """Return records in any of their forms as one experiment.
 
     Records are what :func:`read_experiment` takes, experiments, runs, or a sequence of these, which
     are runs of one rig: copies among them are used once, runs of one name are numbered, and what is
-    known of the rig must agree. ``rate_hz`` is that of files and DataFrames.
+    known of the rig must agree. ``by_hand`` applies to what is read.
     """
+    if theta is not None:
+        return read_experiment(records, theta, **by_hand)
     if isinstance(records, str) or not isinstance(records, Sequence):
         records = [records]
-    parts = [_experiment(part, rate_hz) for part in records]
+    parts = [_experiment(part, by_hand) for part in records]
     if not parts:
         raise InputError(f"records must be {_FORMS}, got {short_repr(records)}")
     if len(parts) == 1:
@@ -147,32 +192,46 @@ def experiment_of(
     return Experiment(place, unique, known, tuple(findings), digests)
 
 
-def _experiment(records: object, rate_hz: float | None) -> Experiment:
+def _experiment(records: object, by_hand: ByHand) -> Experiment:
     """Return one form of records as an experiment."""
-    if isinstance(records, str | os.PathLike) or is_frame(records):
-        return read_experiment(records, rate_hz=rate_hz)
+    if isinstance(records, str | os.PathLike) or frame_of(records) is not None:
+        return read_experiment(records, **by_hand)
     if not isinstance(records, Run | Experiment):
         raise InputError(f"records must be {_FORMS}, got {short_repr(records)}")
-    if rate_hz is not None:
-        raise InputError("rate_hz must be left out where no file or DataFrame is read")
+    for name, value in by_hand.items():
+        if value is not None:
+            raise InputError(f"{name} must be left out where no file or table is read")
     if isinstance(records, Experiment):
         return records
     digests = {records.file: records.sha256} if records.sha256 else {}
     return Experiment(Path(records.file or records.name), (records,), sha256=digests)
 
 
-def _planned(place: Path) -> Description:
-    """Return the description of an experiment; without an ``experiment.toml``, of free decays."""
+def _tables_of(place: Path) -> dict[str, Any]:
+    """Return the tables of an ``experiment.toml``; without one, of free decays."""
     if (place / NAME).is_file():
-        return read_description(place / NAME)
+        return read_toml(place / NAME)
     files = [place]
     if place.is_dir():
         files = sorted(file for file in place.iterdir() if file.suffix.lower() in TABLES)
         files = [f for f in files if f.is_file() and not f.name.startswith((".", "~"))]
-    return Description(runs=tuple(RunPlan(file.name) for file in files))
+    return _free_decays([file.name for file in files])
 
 
-def _every(place: Path, description: Description) -> tuple[list[Run], list[Finding]]:
+def _free_decays(files: Sequence[str]) -> dict[str, Any]:
+    """Return the tables of an experiment of free decays."""
+    return {"rig": {}, "columns": {}, "run": [{"file": file} for file in files]}
+
+
+def _described(place: Path, content: dict[str, Any]) -> Description:
+    """Return the description of a place; InputError if it is invalid, or there is no file."""
+    if not (place / NAME).is_file() and not content["run"]:
+        raise InputError(_NO_RECORD.format(place=place, got=f"0 files of {', '.join(TABLES)}"))
+    with named(str(place / NAME)):
+        return description_of(content)
+
+
+def _every(place: Path, description: Description, taken: Taken) -> tuple[list[Run], list[Finding]]:
     """Read all runs; in a folder without a description, leave out files that are no records."""
     plans, described = description.runs, (place / NAME).is_file()
     plain = place.is_dir() and not described
@@ -185,7 +244,9 @@ def _every(place: Path, description: Description) -> tuple[list[Run], list[Findi
         if described and not path.exists():
             raise InputError(f"{place / NAME}: [[run]] {count}: no file {plan.file!r}")
         try:
-            of_file, shared = _runs(path, plan, description, tables if described else {}, name)
+            of_file, shared = _runs(
+                path, plan, description, tables if described else {}, name, taken
+            )
         except InputError as error:
             if not plain:
                 raise
@@ -195,11 +256,8 @@ def _every(place: Path, description: Description) -> tuple[list[Run], list[Findi
             runs += of_file
             findings += shared
     if not runs:
-        first = f", the first refused: {refused[0]}" if refused else f" of {', '.join(TABLES)}"
-        raise InputError(
-            f"{place}: has no {NAME}: there must be one, or files that are records, got"
-            f" {counted(len(refused), 'file')}{first}"
-        )
+        got = f"{counted(len(refused), 'file')}, the first refused: {refused[0]}"
+        raise InputError(_NO_RECORD.format(place=place, got=got))
     return runs, findings
 
 
@@ -216,24 +274,29 @@ def _names(plans: Sequence[RunPlan]) -> list[str]:
     return names
 
 
-def _runs(
+def _runs(  # noqa: PLR0913, PLR0917 (what is known of the file)
     path: Path,
     plan: RunPlan,
     description: Description,
     tables: dict[str, tuple[Table, str]],
     name: str,
+    taken: Taken,
 ) -> tuple[list[Run], list[Finding]]:
     """Return the runs of a file, one per release, and the findings that belong to none."""
     if plan.file not in tables:
         tables[plan.file] = read_table(path, description.reader)
     table, digest = tables[plan.file]
     work = channels_of(table, description, plan, str(path))
+    refuse_unused(work)
     apply(RULES, work)
     parts, shared = work.split_by_release()
     runs = []
     for k, part in enumerate(parts, 1):
         apply(OF_RELEASE, part)
         runs.append(_run(part, f"{name} {k}/{len(parts)}" if len(parts) > 1 else name, digest))
+    heads = {channel: table.names[place] for channel, place in work.places.items()}
+    alone = {head for head in heads.values() if head and table.names.count(head) == 1}
+    taken[plan.file] = {c: h if h in alone else work.places[c] + 1 for c, h in heads.items()}
     return runs, [dataclasses.replace(finding, where=finding.where or name) for finding in shared]
 
 

@@ -13,7 +13,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendmap.errors import InputError
 from pendmap.model.quantities import GRAVITY
+from pendmap.records.by_hand import by_hand
 from pendmap.records.units import DEGREE
 from pendmap.signal.half_cycles import after_turns, swings
 from pendmap.signal.robust import Z95, normal_scale
@@ -168,6 +170,13 @@ def seconds(work: Work) -> Finding | None:
             continue
         if "time" in work.declared:
             return work.finding("time-unit.declared", period=small, unit=name)
+        span = {"from_s": work.plan.from_s, "to_s": work.plan.to_s}
+        span = {name: time for name, time in span.items() if math.isfinite(time)}
+        if span:
+            raise InputError(
+                f"{work.where}: {' and '.join(span)} must be in s, the times look like {name}:"
+                f" {by_hand(work.where, time_unit=name, **span)}"
+            )
         finding = work.finding("time-unit.short", period=small, unit=name)
         work.time *= factor
         work.theta *= factor if work.integrated else 1.0

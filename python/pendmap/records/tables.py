@@ -23,13 +23,6 @@ MOST_NULS: Final = 0.2  # Share of NUL bytes above which a file is no text
 _CONTROLS: Final = re.compile(r"[\x01-\x08\x0b\x0e-\x1f\x7f]")
 
 
-def is_frame(records: object) -> bool:
-    """Return whether records are a DataFrame."""
-    import pandas as pd
-
-    return isinstance(records, pd.DataFrame)
-
-
 def table_of(frame: pd.DataFrame, where: str) -> Table:
     """Return the numbers of a DataFrame; an index of times, or one with a name, is a column too."""
     import pandas as pd
@@ -46,12 +39,15 @@ def table_of(frame: pd.DataFrame, where: str) -> Table:
     for k in range(frame.shape[1]):
         column = frame.iloc[:, k]
         if pd.api.types.is_datetime64_any_dtype(column):
-            column = column - column.iloc[0]
+            column = column - column.bfill().iloc[0]
         if pd.api.types.is_timedelta64_dtype(column):
             column = column.dt.total_seconds()
         elif isinstance(column.dtype, pd.CategoricalDtype):
             column = column.astype(object)
         numbers = pd.to_numeric(column, errors="coerce")
+        if numbers.isna().all():
+            dates = pd.to_datetime(column, errors="coerce", format="ISO8601", utc=True)
+            numbers = (dates - dates.bfill().iloc[0]).dt.total_seconds()
         columns.append(numbers.to_numpy(dtype=float, na_value=np.nan))
     values = np.column_stack(columns)
     order = np.arange(values.shape[0])

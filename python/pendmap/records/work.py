@@ -10,6 +10,7 @@ import numpy as np
 
 from pendmap.errors import InputError
 from pendmap.formatting import counted, listed
+from pendmap.records.by_hand import by_hand
 from pendmap.records.experiment import finding_of
 
 if TYPE_CHECKING:
@@ -52,6 +53,7 @@ class Work:
     findings: list[Finding]
     columns: Mapping[str, str]  # heading of each channel
     unused: tuple[str, ...]  # headings of columns without a channel
+    places: Mapping[str, int]  # index of the column of each channel
     segments: list[Segment] = dataclasses.field(default_factory=list)
     count: float = 0.0  # step of the readings, declared or estimated, rad; 0 for none
     estimated_step: float = 0.0  # step estimated from the readings, rad; 0 for none
@@ -155,13 +157,20 @@ class Work:
             parts.append(part)
         return parts, shared
 
+    def other(self, option: str) -> str:
+        """Return the end of a message: the command that reads another column, if there is one."""
+        if not self.unused:
+            return ""
+        number = self.unused[0].removeprefix("column ")
+        return f": {by_hand(self.where, **{option: number})}"
+
     def refuse_short(self) -> None:
         """Raise InputError if there are too few samples for a record."""
         least = _FEWEST_PEAKS if self.peaks_only else FEWEST_SAMPLES
         if self.time.size < least:
             raise InputError(
                 f"{self.where}: must have {least} samples or more with time and angle, got"
-                f" {counted(self.time.size, 'sample')}"
+                f" {counted(self.time.size, 'sample')}{self.other('angle')}"
             )
 
 

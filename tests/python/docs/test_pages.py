@@ -7,6 +7,7 @@ import re
 import shlex
 import subprocess
 import sys
+import tomllib
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,7 +16,7 @@ from urllib.parse import unquote, urlsplit
 import pytest
 
 from conftest import run_command
-from pendmap.records.description import read_description
+from pendmap.records.description import description_of
 
 if TYPE_CHECKING:
     from conftest import Run
@@ -143,7 +144,7 @@ def test_every_toml_block_is_a_valid_file_of_its_kind(
         (tmp_path / "a.csv").write_text("t_s,volts,amplitude_rad\n0,1,1\n", encoding="utf-8")
         text += '[[run]]\nfile = "a.csv"\nkind = "free"\n'
         (tmp_path / "experiment.toml").write_text(text, encoding="utf-8")
-        described = read_description(tmp_path / "experiment.toml")
+        described = description_of(tomllib.loads(text))
         assert described.columns["angle"].name == "volts"
         return
     (tmp_path / "own.toml").write_text(text, encoding="utf-8")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import datetime as dt
+import json
 import math
 import pickle
 import tomllib
@@ -14,7 +15,7 @@ import pytest
 
 import pendmap
 from models import DRAG, EXAMPLE, SWING, written
-from pendmap import Effect, InputError, Pendulum, Rig, load_model, save_model
+from pendmap import Effect, Formula, InputError, Pendulum, Rig, load_model, save_model
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -171,6 +172,37 @@ def test_a_file_in_si_with_every_key_is_read_and_written_unchanged(tmp_path: Pat
     extreme = Pendulum(gamma=1e300, p=-1 / 3, omega=5e-324, notes=notes)
     back = load_model(save_model(extreme, tmp_path / "extreme.toml"))
     assert (back, back.notes) == (extreme, notes)
+
+
+@pytest.mark.parametrize("in_si", [True, False])
+def test_models_become_dicts_and_come_back(tmp_path: Path, in_si: bool) -> None:  # noqa: FBT001
+    bend = Formula("bend", "-k*sqrt(abs(v))*sign(v) - b*sin(theta)", {"k": 1.5, "b": 2})
+    rig = load_model(written(tmp_path, EXAMPLE))
+    notes = {"covariance": rig.notes["covariance"]}
+    rig = dataclasses.replace(rig, effects=(*rig.effects, bend(k=0.1, b=0.2)), notes=notes)
+    model = rig if in_si else rig.pendulum
+    again = type(model).from_dict(json.loads(json.dumps(model.to_dict())))
+    assert again == model
+    assert again.notes == model.notes
+    other = Pendulum if in_si else Rig
+    with pytest.raises(InputError, match=r"content must be a model .*, got one of the other kind"):
+        other.from_dict(model.to_dict())
+    for wrong in ([], {"pendulum": {"w1": 3}}, {}):
+        with pytest.raises(InputError):
+            type(model).from_dict(wrong)  # type: ignore[arg-type]
+
+
+def test_a_rig_is_driven_by_stroke_and_frequency() -> None:
+    rig = Rig(w0=6.2, c_over_m=0.05, phi=0.4, effects=(DRAG,))
+    shaken = rig.driven(stroke_mm=20, frequency_hz=1.9)
+    assert shaken == dataclasses.replace(rig, p=shaken.p, Omega=2 * math.pi * 1.9)
+    assert shaken.p == pytest.approx(0.02 * shaken.Omega**2 / 9.81, rel=1e-15)
+    faster = shaken.driven(frequency_hz=3.8)
+    assert faster.p == pytest.approx(4 * shaken.p, rel=1e-15)  # the stroke stays
+    assert shaken.driven(p=0.3, phi=0.0) == dataclasses.replace(shaken, p=0.3, phi=0.0)
+    for wrong in ({"w0": 3.0}, {"stroke_mm": 20.0}, {"p": 0.2, "stroke_mm": 20, "Omega": 9.0}):
+        with pytest.raises(InputError, match=r"w0 is not known|needs a frequency|contradict"):
+            rig.driven(**wrong)
 
 
 @pytest.mark.parametrize(

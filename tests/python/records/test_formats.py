@@ -125,7 +125,7 @@ def test_times_may_be_dates(
         (pd.DataFrame(), "DataFrame: must have rows of numbers, it is empty"),
         (pd.DataFrame({"t_s": [0.0, 0.1]}), "DataFrame: no column of angles"),
         (pd.DataFrame({"t": SLOW[0], "x": 6 * SLOW[0], "y": SLOW[1]}), "circle, they lie on none"),
-        (np.zeros((9, 2)), "path must be a path or a DataFrame, got array"),
+        (np.zeros((9, 2)), "path must be a path, a table"),
     ],
 )
 def test_a_data_frame_that_is_no_record_is_refused(records: Any, says: str) -> None:  # noqa: ANN401
@@ -352,7 +352,7 @@ def test_a_rate_gives_the_times_unless_a_column_has_them(tmp_path: Path) -> None
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        ([], "--rate 1000 or rate_hz = 1000"),
+        ([], "must be given, got 1, 2: pendmap look alone.txt --rate 100 --angle 1"),
         *((["--rate", rate], "rate") for rate in ("0", "-5", "1e12", "quick")),
     ],
 )

@@ -42,7 +42,7 @@ RANDOM: Final = group("Random numbers", "--seed 1")
 LONG: Final = group("Long runs", "--out map.zarr --resume")
 MACHINE: Final = group("Machine", "--simd portable")
 OUTPUT: Final = group("Output", "--json > result.json")
-RECORD: Final = group("Records", "--rate 100")
+RECORD: Final = group("Records", "--time 1 --angle theta --angle-unit deg --from 5.6")
 
 
 def option(

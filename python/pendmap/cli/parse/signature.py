@@ -36,7 +36,6 @@ GROUPS: Final = {
     **dict.fromkeys(("theta", "velocity"), options.START),
     "seed": options.RANDOM,
     "threads": options.MACHINE,
-    "rate_hz": options.RECORD,
 }
 """Group of what means the same in all commands; others have a group of their command."""
 
@@ -130,7 +129,8 @@ def options_of(
         parameter = declared[name]
         annotation = parameter.annotation.split(" |")[0]
         written = f"--{typed.replace('_', '-')} {name}"
-        kind, home = kinds.get(name, _TYPES.get(annotation, types.TEXT)), GROUPS.get(name, group)
+        kind = kinds.get(name, _TYPES.get(annotation, types.TEXT))
+        home = group if group is options.RECORD else GROUPS.get(name, group)
         # The default of an option must be a literal in the source.
         assert home is not None and parameter.default is not ..., name  # noqa: S101, PT018
         if annotation == "bool":
@@ -141,3 +141,19 @@ def options_of(
         else:
             made.append(option(written, kind, parameter.help, parameter.default, group=home))
     return added(*made)
+
+
+_READING: Final = "time angle velocity x y time_unit angle_unit angle_scale rate=rate_hz"
+_COLUMNS: Final = dict.fromkeys(("time", "angle", "velocity", "x", "y"), types.COLUMN)
+reading_options: Final = options_of(
+    "records.overrides.ByHand",
+    f"{_READING} from=from_s to=to_s counts_per_turn",
+    options.RECORD,
+    **_COLUMNS,
+)
+"""Options that say how records are read."""
+
+
+def take_reading(given: dict[str, Any]) -> Any:  # noqa: ANN401 (a ByHand)
+    """Remove the options that say how records are read from ``given`` and return them."""
+    return {name: given.pop(name) for name in parameters("records.overrides.ByHand")}

@@ -230,6 +230,7 @@ NUMBER_OR_RANGE = OptionType[float | AxisText](
     "number|A:B:N", lambda text: _range(text) if ":" in text else _number(text)
 )
 TEXT = OptionType("text", str)
+COLUMN = OptionType[str | int]("column", lambda text: int(text) if text.isdecimal() else text)
 EFFECT = OptionType("name", str, _effects)
 METHOD = OptionType("name", str, _methods)
 VALUES = OptionType("A:B:N", _values)
