@@ -91,7 +91,6 @@ class Column:
     unit: str = ""  # text behind each number
     parts: str = ""  # of a clock: day, time
     wrap: int = 0  # s after which a clock begins again
-    blank: bool = False  # no cell has a text
 
     def at(self, rows: Indices) -> Column:
         """Return the column at some rows."""
@@ -131,7 +130,7 @@ def column_of(cells: list[str], decimal: str) -> Column:
     odd[odd] = ~texts[odd].str.lower().isin(_NOTHING).to_numpy()
     words = texts[odd]
     if words.empty:
-        return Column("number", values, odd, base, blank=bool((texts == "").all()))
+        return Column("number", values, odd, base)
     middle = words.iloc[words.size // 2]
     for pattern, drop, insert in _respelled(decimal):
         if re.fullmatch(pattern, middle):

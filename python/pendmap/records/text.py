@@ -43,6 +43,7 @@ _HEADS: Final = 30  # Most lines above the numbers of a short file
 TIME: Final = "t_s"  # Heading of times that a record has as dates
 LARGEST_READING: Final = 1e18  # Largest reading; larger ones are missing
 _POINT: Final = re.compile(r'(?<=:\d\d),(\d{3}|\d{6})(?=[,;\t|"]|$)')  # of s, before a separator
+_HALF: Final = re.compile(r"(?<=\d) (?=[AaPp]\.?[Mm]\b)")  # before am or pm
 _ARROW: Final = re.compile(r"^(\d\d:\d\d:\d\d\.\d+) -> ")  # of the Arduino IDE
 # What loggers set around a name: "Latest: Time (s)", "Time (s) Run #1", "Angle, Ch 1&2 (rad)"
 _MARKS: Final = (
@@ -104,7 +105,7 @@ class _Form:
 def parsed(text: str, reader: Reader, where: str, findings: list[Finding]) -> Table:
     """Return the table of a text; raise InputError if there are no rows of numbers."""
     text = text if text.isascii() else _SET.sub("'", text).translate(_SIGNS)
-    every = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    every = _HALF.sub("", text).replace("\r\n", "\n").replace("\r", "\n").split("\n")
     places = [k for k, line in enumerate(every, 1) if k > reader.skip_rows and line.strip()]
     if not places:
         raise InputError(f"{where}: must be a file with rows of numbers, it is empty")
@@ -127,7 +128,8 @@ def parsed(text: str, reader: Reader, where: str, findings: list[Finding]) -> Ta
             " decimal and skip_rows"
         )
     columns = [column.at(keep) for column in columns]
-    width = max(k for k, column in enumerate(columns, 1) if not column.blank)
+    starts, whole = (keep * form.width).tolist(), range(form.width)
+    width = max(k + 1 for k in whole if any(flat[i + k].strip() for i in starts))
     read, columns = np.array(at)[keep], columns[:width]
     names = _headings(lines[begin : read[0]], columns, form, where)
     dated = _clocks(columns, names)
@@ -142,7 +144,7 @@ def parsed(text: str, reader: Reader, where: str, findings: list[Finding]) -> Ta
         findings.append(finding_of("tables-behind", where=ends, tables=tables))
     firsts = {k: int(np.argmax(column.odd)) for k, column in enumerate(columns) if column.odd.any()}
     texts = {
-        k: f"{short_repr(flat[keep[i] * form.width + k])} in line {number[read[i]]}"
+        k: f"{short_repr(flat[starts[i] + k])} in line {number[read[i]]}"
         for k, i in firsts.items()
         if columns[k].kind == "text"
     }
@@ -319,8 +321,9 @@ def _parts(line: str, columns: Sequence[Column], form: _Form) -> list[str]:
     parts = split(bare if form.delimiter == ";" else bare.lstrip("; "), form.delimiter)
     names = _trimmed(parts)
     first = columns[0]
-    if len(names) == width - 1 > 1 and (first.kind == "text" or np.all(np.diff(first.values) == 1)):
-        return ["", *names]  # the first column numbers the rows
+    numbered = line[0] == '"' and np.all(np.diff(first.values) == 1)
+    if len(names) == width - 1 > 1 and (first.kind == "text" or numbered):
+        return ["", *names]  # as R numbers the rows
     # Columns at the end may be empty.
     fits = len(parts) >= width and (len(names) <= form.width or form.delimiter in "\t;|")
     return [part.strip() for part in parts[:width]] if fits else []
