@@ -7,6 +7,7 @@ an outlier two. Samples at an end of a record or a gap are judged by a cubic.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from typing import TYPE_CHECKING, Final
 
@@ -14,9 +15,10 @@ import numpy as np
 
 from pendmap.formatting import counted, moment
 from pendmap.records.clock import longest_between
-from pendmap.records.noise import DEGREES
+from pendmap.records.noise import DEGREES, fastest
 from pendmap.records.rod_sensors import angle_of_rate
-from pendmap.records.slips import slips_of
+from pendmap.records.slips import MOST_INTERVALS, slips_of
+from pendmap.records.steps import interpolated, sides_of
 from pendmap.records.work import Jump
 from pendmap.signal.local_polynomial import POINTS, local_fit
 from pendmap.signal.robust import broad_scale, normal_scale, widened
@@ -25,6 +27,8 @@ if TYPE_CHECKING:
     from pendmap.records.experiment import Finding
     from pendmap.records.work import Work
     from pendmap.signal import Floats, Indices, Mask
+
+    Verdict = tuple[slice | Indices, Jump | None]
 
 SUSPECT: Final = 10.0  # Local standard deviations of a residual above which it is examined
 SCALE_SAMPLES: Final = 151  # Samples from which the local standard deviation is estimated
@@ -40,26 +44,27 @@ OFF_TURN: Final = 0.1  # Greatest deviation of a jump from whole turns, rad
 OTHER_RECORD: Final = 0.5  # Size of a jump, rad, above which a second recording may begin
 END_SAMPLES: Final = 10  # Samples of each end that are compared with predictions
 END_GAP: Final = POINTS // 2  # Longest gap, intervals, that windows cross
+FARTHEST_CUBIC: Final = 1.5  # Phase of a side, rad, above which a cubic does not follow a swing
 PREDICTIONS: Final = 40  # Predictions further inside that give the usual error
 END_DEGREES: Final = (2, 3)  # Degrees of the predicting polynomials
 
 
 def outliers(work: Work) -> Finding | None:
     """Mark outliers, and note the jumps of the reading."""
-    theta, bad = work.theta.copy(), ~work.trusted
+    time, theta, bad = work.time.copy(), work.theta.copy(), ~work.trusted
     if theta.size < 2 * POINTS or bad.all():
         return None
-    _bridge(work.time, theta, bad)
+    _bridge(time, theta, bad)
     false, jumps = np.zeros(theta.size, bool), list[Jump]()
     # The motion has corners next to clipped or frozen samples.
     corner = widened(bad, SIDE)
     seen = corner.copy()
     for _ in range(PASSES):
-        at, scale = _suspects(work, theta)
+        at, scale = _suspects(time, theta, work.count)
         at, scale = at[~seen[at]], scale[~seen[at]]
         if at.size + np.count_nonzero(false) > MOST_OUTLIERS * theta.size:
             return work.finding("not-smooth", percent=100 * MOST_OUTLIERS)
-        verdicts = _judged(work, theta, at, scale)
+        verdicts = _judged(time, theta, ~(bad | false), at, scale, work.count)
         if not verdicts:
             break
         for k, group, jump in verdicts:
@@ -68,9 +73,10 @@ def outliers(work: Work) -> Finding | None:
             if jump is not None:
                 jumps.append(jump)
                 theta[jump.at :] -= jump.size
-        _bridge(work.time, theta, false)
-    false |= ~corner & false_ends(work.time, theta, ~(bad | false), SUSPECT, work.count)
-    _bridge(work.time, theta, false)
+                time[jump.at :] += jump.slip
+        _bridge(time, theta, false)
+    false |= ~corner & false_ends(time, theta, ~(bad | false), SUSPECT, work.count)
+    _bridge(time, theta, false)
     work.jumps = sorted(jumps, key=lambda jump: jump.at)
     moved = np.zeros(theta.size)
     for jump in work.jumps:
@@ -87,12 +93,42 @@ def _bridge(time: Floats, theta: Floats, false: Mask) -> None:
         theta[false] = np.interp(time[false], time[~false], theta[~false])
 
 
+def _by_sides(
+    time: Floats, theta: Floats, good: Mask, k: int, verdict: Verdict, count: float
+) -> Verdict:
+    """Return the outliers and the jump around ``k`` by the swings on both sides of it."""
+    group, jump = verdict
+    frequency = fastest(time, theta, count)[1]
+    interval = float(np.median(np.diff(time)))
+    slow = SIDE * frequency * interval > FARTHEST_CUBIC
+    if jump is None and not slow:
+        return group, jump
+    places = np.arange(time.size)[group]
+    low, high = min([k - 2, *(places - 1)]), max([k + 3, *(places + 2)])
+    sides = sides_of(time, theta, good, slice(max(low, 0), high), frequency, count)
+    if sides is None:
+        return group, jump
+    at, limit = sides.at, CERTAIN_JUMP**2
+    if sides.both < limit:
+        return np.flatnonzero(sides.false), None
+    if min(sides.steps, sides.slips) > limit:
+        return group, jump
+    group = np.flatnonzero(sides.false)
+    if sides.steps > sides.slips:
+        return group, Jump(at, sides.step, sides.step_error, certain=True)
+    if abs(sides.slip) > (MOST_INTERVALS + 0.5) * interval:
+        return verdict
+    halves = round(2 * sides.slip / interval) * interval / 2
+    near = abs(sides.slip - halves) < 3 * sides.slip_error
+    return group, Jump(at, 0.0, 0.0, halves if near and halves else sides.slip, certain=True)
+
+
 def _judged(
-    work: Work, theta: Floats, at: Indices, scale: Floats
+    time: Floats, theta: Floats, good: Mask, at: Indices, scale: Floats, count: float
 ) -> list[tuple[int, slice | Indices, Jump | None]]:
     """Return suspects, with outliers and jumps; jumps near outliers are judged after them."""
     verdicts = [
-        (k, *_judge(work.time, theta, k, sigma, work.count))
+        (k, *_by_sides(time, theta, good, k, _judge(time, theta, k, sigma, count), count))
         for k, sigma in zip(at.tolist(), scale.tolist(), strict=True)
     ]
     spikes = np.array([k for k, group, jump in verdicts if jump is None and theta[group].size])
@@ -103,14 +139,14 @@ def _judged(
     ]
 
 
-def _suspects(work: Work, theta: Floats) -> tuple[Indices, Floats]:
+def _suspects(time: Floats, theta: Floats, count: float) -> tuple[Indices, Floats]:
     """Return samples far from their neighbours, and the standard deviation around each."""
     from scipy.ndimage import maximum_filter1d, median_filter
 
     best, *others = (
-        local_fit(work.time, theta, degree=degree, points=points) for degree, points in DEGREES[:3]
+        local_fit(time, theta, degree=degree, points=points) for degree, points in DEGREES[:3]
     )
-    for other in others:
+    for other in (*others, interpolated(theta)):
         if normal_scale(other.residual) < 0.7 * normal_scale(best.residual):
             best = other
     size = np.abs(best.residual)
@@ -121,7 +157,7 @@ def _suspects(work: Work, theta: Floats) -> tuple[Indices, Floats]:
     highest = maximum_filter1d(
         size, 2 * best.neighbours + 1, mode="nearest"
     )  # of windows in common
-    which = (size > SUSPECT * scale + 2 * work.count) & (size >= highest)
+    which = (size > SUSPECT * scale + 2 * count) & (size >= highest)
     return best.middle[which], scale[which]
 
 
@@ -195,15 +231,41 @@ def _least_absolute(columns: Floats, y: Floats) -> Floats:
 
 def slips(work: Work) -> Finding | None:
     """Correct the clock for jumps that are its slips."""
-    if not work.jumps or work.clock_stderr:
+    if not work.jumps:
         return None
-    clock = slips_of(work.time, work.bridged)
+    clock = None if work.clock_stderr else slips_of(work.time, work.bridged)
     if clock is None:
-        return None
+        return _slips_of_jumps(work)
     number, size, error = counted(clock.places.size, "slip"), 1e3 * clock.slip, 1e3 * clock.stderr
     finding = work.finding("time-slips", at=clock.places, slips=number, size=size, error=error)
     work.time = clock.time
     work.jumps = [j for j in work.jumps if np.min(np.abs(clock.places - j.at)) > SIDE]
+    return finding
+
+
+def _slips_of_jumps(work: Work) -> Finding | None:
+    """Move the times after each jump that is a slip of the clock."""
+    late = [jump for jump in work.jumps if jump.slip]
+    if not late:
+        return None
+    work.jumps = [jump for jump in work.jumps if not jump.slip]
+    sizes = ", ".join(f"{1e3 * jump.slip:+.3g}" for jump in late[:4])
+    at = np.array([jump.at for jump in late])
+    finding = work.finding("time-slips.each", at=at, slips=counted(at.size, "slip"), sizes=sizes)
+    time = work.time.copy()
+    for jump in late:
+        time[jump.at :] += jump.slip
+    # A frame that comes twice has the time of the one before.
+    early = np.minimum.accumulate(time[::-1])[::-1]
+    again = np.append(time[:-1] > early[1:] - 0.1 * np.median(np.diff(time)), False)
+    work.time = time
+    if again.any():
+        work.jumps = [
+            dataclasses.replace(jump, at=jump.at - int(again[: jump.at].sum()))
+            for jump in work.jumps
+        ]
+        work.bridged = work.bridged[~again]
+        work.keep(~again)
     return finding
 
 
@@ -227,6 +289,11 @@ def jumps(work: Work) -> Finding | None:
             work.theta[at:] -= steps * step
         by = ", ".join(f"{count:+d}" for count in counts[:4])
         return work.finding(key, at=places, jumps=number, counts=by)
+    if all(jump.certain for jump in work.jumps):
+        for jump in work.jumps:
+            work.theta[jump.at :] -= jump.size
+        errors = [f"{j.size:+.3g} +- {j.error:.1g}" for j in work.jumps[:4]]
+        return work.finding("missed-counts.sized", at=places, jumps=number, sizes=", ".join(errors))
     low, high = longest_between([0, *places.tolist()], work.time.size)
     work.trusted[:low] = work.trusted[high:] = False
     other = ", or another recording begins" if max(map(abs, sizes)) > OTHER_RECORD else ""
