@@ -1,0 +1,175 @@
+"""Steps of a reading, and slips of its clock, against swings fitted on both sides of them.
+
+Around an instant, readings of a free swing are fitted by harmonics of a chirp whose amplitude changes,
+``sum_m A_m(u) exp(i m (w u + b u^2))``, with a zero that changes by ``step`` and a time that changes
+by ``slip``, ``u = t + slip``. A reading that is false leaves both at zero.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from pendmap.signal.local_polynomial import LocalFit
+from pendmap.signal.robust import broad_scale, normal_scale
+
+if TYPE_CHECKING:
+    from pendmap.signal import Floats, Mask
+
+BESIDE: Final = 5  # Samples on each side from which one is interpolated
+PERIODS: Final = 2.25  # Periods on each side that are fitted
+FEWEST: Final = 10  # Fewest readings on each side
+MOST: Final = 150  # Most readings on each side that are fitted
+FREQUENCIES: Final = np.linspace(0.7, 1.5, 65)  # Starts of the fit, over the estimated frequency
+ROUNDS: Final = 8  # Gauss-Newton steps
+FALSE: Final = 5.0  # Standard deviations of a reading that is false
+WORST: Final = 0.1  # Greatest residual over the rms swing of a motion that is followed
+
+
+def interpolated(theta: Floats) -> LocalFit:
+    """Return residuals of the best interpolation from ``BESIDE`` even samples on each side."""
+    n = 2 * BESIDE + 1
+    windows = np.lib.stride_tricks.sliding_window_view(theta, n)
+    pairs = windows[:, :BESIDE] + windows[:, : BESIDE : -1]
+    columns = np.column_stack([np.ones(len(pairs)), pairs])
+    middle, right = windows[:, BESIDE], np.ones(len(pairs), bool)
+    for _ in range(3):
+        weights = np.linalg.lstsq(columns[right], middle[right], rcond=1e-9)[0]
+        left = middle - columns @ weights
+        right = np.abs(left) <= FALSE * broad_scale(np.abs(left))
+    gain = math.sqrt(1 + 2 * float(weights[1:] @ weights[1:]))
+    place = np.arange(BESIDE, theta.size - BESIDE)
+    return LocalFit(place, left / gain, np.zeros(left.size), BESIDE, 1.0, np.full(n, 1 / n))
+
+
+@dataclasses.dataclass(frozen=True)
+class Sides:
+    """Change of a motion from before an instant to after it."""
+
+    step: float  # of the zero, rad, without a slip
+    step_error: float
+    slip: float  # of the time, s, without a step
+    slip_error: float
+    steps: float  # decrease of chi squared by a step, beside a slip
+    slips: float  # decrease of chi squared by a slip, beside a step
+    both: float  # decrease of chi squared by both
+    false: Mask  # readings between the sides that follow neither of them
+    at: int  # first reading after the change
+
+
+def sides_of(
+    time: Floats, theta: Floats, good: Mask, between: slice, frequency: float, count: float
+) -> Sides | None:
+    """Return the change of a swing over the readings ``between``; None if no swing is followed."""
+    centre, reach = time[between].mean(), 2 * math.pi * PERIODS / frequency
+    low, high = np.searchsorted(time, (centre - reach, centre + reach))
+    rows = np.arange(low, high)
+    outside = good[rows] & ((rows < between.start) | (rows >= between.stop))
+    parts = [rows[outside & side] for side in (rows < between.start, rows >= between.stop)]
+    if min(part.size for part in parts) < FEWEST:
+        return None
+    used = np.concatenate([part[:: max(part.size // MOST, 1)] for part in parts])
+    scale = (time[used] - centre) / reach
+    fit = _fitted(scale, theta[used], (used >= between.stop) * 1.0, frequency * reach)
+    if fit is None or fit.sigma > WORST * float(np.std(theta[used])):
+        return None
+    sigma = max(fit.sigma, count / math.sqrt(12))
+    weight = np.linalg.pinv(fit.normal)[[[1], [-1]], [1, -1]] * sigma**2
+    change, (a, c), b = fit.unknown[[1, -1]], np.diag(weight), weight[0, 1]
+    # Readings between the sides belong to the one before up to a place, and to the other after.
+    inner = np.arange(between.start, between.stop)
+    off = np.abs(
+        [theta[inner] - fit.model((time[inner] - centre) / reach, side) for side in (0.0, 1.0)]
+    )
+    limit = FALSE * sigma + count
+    cost = np.minimum(off, limit)
+    splits = [cost[0, :k].sum() + cost[1, k:].sum() for k in range(inner.size + 1)]
+    split = int(np.argmin(splits))
+    far = np.where(np.arange(inner.size) < split, off[0], off[1]) > limit
+    false = np.zeros(time.size, bool)
+    false[inner[far]] = True
+    return Sides(
+        step=change[0] - b / c * change[1],
+        step_error=math.sqrt(a - b * b / c),
+        slip=(change[1] - b / a * change[0]) * reach,
+        slip_error=math.sqrt(c - b * b / a) * reach,
+        steps=change[0] ** 2 / a,
+        slips=change[1] ** 2 / c,
+        both=float(change @ np.linalg.solve(weight, change)),
+        false=false,
+        at=between.start + split,
+    )
+
+
+@dataclasses.dataclass
+class _Fit:
+    """Unknowns: zero, step, harmonics; frequency, chirp, slip."""
+
+    unknown: Floats
+    normal: Floats = dataclasses.field(default_factory=lambda: np.empty((0, 0)))
+    sigma: float = math.inf
+
+    def columns(self, time: Floats, after: Floats | float) -> Floats:
+        """Return the derivatives of the model by the unknowns."""
+        frequency, chirp, slip = self.unknown[-3:]
+        after = np.broadcast_to(after, time.shape)
+        u = time + slip * after
+        phase = frequency * u + chirp * u * u
+        waves = [u**k * np.exp(1j * m * phase) for m, k in _TERMS]
+        linear = [np.ones_like(u), after * 1.0, *(f(w) for w in waves for f in (np.real, np.imag))]
+        pairs = self.unknown[2:-3].reshape(-1, 2)
+        speed = sum(
+            m * (b * w.real - a * w.imag)
+            for (m, _), w, (a, b) in zip(_TERMS, waves, pairs, strict=True)
+        )
+        slope = speed * (frequency + 2 * chirp * u)
+        return np.column_stack([*linear, speed * u, speed * u * u, slope * after])
+
+    def model(self, time: Floats, after: Floats | float) -> Floats:
+        """Return the readings of the model."""
+        return np.asarray(self.columns(time, after)[:, :-3] @ self.unknown[:-3])
+
+    def settle(self, time: Floats, theta: Floats, after: Floats) -> None:
+        """Set the unknowns that are linear, and the deviation of the readings."""
+        linear = self.columns(time, after)[:, :-3]
+        self.unknown[:-3] = np.linalg.lstsq(linear, theta, rcond=1e-9)[0]
+        left = theta - linear @ self.unknown[:-3]
+        self.sigma = float(np.linalg.norm(left)) / math.sqrt(max(time.size - self.unknown.size, 1))
+
+
+_TERMS: Final = ((1, 0), (1, 1), (1, 2), (2, 0), (3, 0))  # Harmonic and power of the time
+
+
+def _fitted(time: Floats, theta: Floats, after: Floats, frequency: float) -> _Fit | None:
+    """Return the fit of the motion, without false readings; None if it does not converge."""
+    size = 2 + 2 * len(_TERMS) + 3
+    if time.size < size + 3:
+        return None
+    starts = []
+    for share in FREQUENCIES:
+        fit = _Fit(np.append(np.zeros(size - 3), [share * frequency, 0.0, 0.0]))
+        fit.settle(time, theta, after)
+        starts.append(fit)
+    fit = min(starts, key=lambda fit: fit.sigma)
+    for _ in range(2):
+        for _ in range(ROUNDS):
+            columns = fit.columns(time, after)
+            left = theta - columns[:, :-3] @ fit.unknown[:-3]
+            fit.unknown = fit.unknown + np.linalg.lstsq(columns, left, rcond=1e-9)[0]
+            fit.settle(time, theta, after)
+        away = np.abs(theta - fit.model(time, after))
+        right = away <= FALSE * max(normal_scale(away), 1e-12) * math.sqrt(
+            time.size / (time.size - size)
+        )
+        if right.sum() < size + 3 or not math.isfinite(fit.sigma):
+            return None
+        if right.all():
+            break
+        time, theta, after = time[right], theta[right], after[right]
+        fit.settle(time, theta, after)
+    columns = fit.columns(time, after)
+    fit.normal = columns.T @ columns
+    return fit
