@@ -17,7 +17,7 @@ from pendmap.formatting import counted, moment
 from pendmap.records.clock import longest_between
 from pendmap.records.noise import DEGREES, fastest
 from pendmap.records.rod_sensors import angle_of_rate
-from pendmap.records.slips import MOST_INTERVALS, slips_of
+from pendmap.records.slips import MOST_INTERVALS, slips_of, suspected
 from pendmap.records.steps import interpolated, sides_of
 from pendmap.records.work import Jump
 from pendmap.signal.local_polynomial import POINTS, local_fit
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     Verdict = tuple[slice | Indices, Jump | None]
 
 SUSPECT: Final = 10.0  # Local standard deviations of a residual above which it is examined
+SUSPECT_SLOW: Final = 6.0  # The same where sampling is too slow for cubics
+NEAR: Final = 4  # Readings on each side of a suspect that may be false as well
 SCALE_SAMPLES: Final = 151  # Samples from which the local standard deviation is estimated
 PASSES: Final = 8  # Most searches for outliers; each may reveal one next to another
 MOST_OUTLIERS: Final = 0.1  # Greatest share of outliers; with more, no sample is marked
@@ -98,13 +100,11 @@ def _by_sides(
 ) -> Verdict:
     """Return the outliers and the jump around ``k`` by the swings on both sides of it."""
     group, jump = verdict
-    frequency = fastest(time, theta, count)[1]
-    interval = float(np.median(np.diff(time)))
-    slow = SIDE * frequency * interval > FARTHEST_CUBIC
-    if jump is None and not slow:
+    if jump is None and not _slow(time, theta, count):
         return group, jump
+    frequency, interval = fastest(time, theta, count)[1], float(np.median(np.diff(time)))
     places = np.arange(time.size)[group]
-    low, high = min([k - 2, *(places - 1)]), max([k + 3, *(places + 2)])
+    low, high = min([k - NEAR, *(places - 1)]), max([k + NEAR + 1, *(places + 2)])
     sides = sides_of(time, theta, good, slice(max(low, 0), high), frequency, count)
     if sides is None:
         return group, jump
@@ -121,6 +121,11 @@ def _by_sides(
     halves = round(2 * sides.slip / interval) * interval / 2
     near = abs(sides.slip - halves) < 3 * sides.slip_error
     return group, Jump(at, 0.0, 0.0, halves if near and halves else sides.slip, certain=True)
+
+
+def _slow(time: Floats, theta: Floats, count: float) -> bool:
+    """Return whether the sampling is too slow for cubics."""
+    return SIDE * fastest(time, theta, count)[1] * float(np.median(np.diff(time))) > FARTHEST_CUBIC
 
 
 def _judged(
@@ -152,13 +157,22 @@ def _suspects(time: Floats, theta: Floats, count: float) -> tuple[Indices, Float
     size = np.abs(best.residual)
     if size.size < POINTS:
         return np.empty(0, np.intp), np.empty(0)
+    limit = SUSPECT
+    if _slow(time, theta, count):  # what the swings on both sides do not confirm is dropped
+        limit = SUSPECT_SLOW
+        size = np.maximum(size, np.abs(np.diff(best.residual, prepend=best.residual[0])) / 2**0.5)
     near = 1.4826 * median_filter(size, size=min(SCALE_SAMPLES, size.size), mode="nearest")
     scale = np.maximum(near, max(broad_scale(size), 1e-9))
     highest = maximum_filter1d(
         size, 2 * best.neighbours + 1, mode="nearest"
     )  # of windows in common
-    which = (size > SUSPECT * scale + 2 * count) & (size >= highest)
-    return best.middle[which], scale[which]
+    which = (size > limit * scale + 2 * count) & (size >= highest)
+    at, scale = best.middle[which], scale[which]
+    if limit == SUSPECT_SLOW:
+        more = np.setdiff1d(suspected(time, theta), at)
+        scale = np.append(scale, np.full(more.size, broad_scale(np.abs(best.residual))))
+        at = np.append(at, more)
+    return at, scale
 
 
 def _judge(

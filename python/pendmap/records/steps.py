@@ -33,7 +33,7 @@ def interpolated(theta: Floats) -> LocalFit:
     """Return residuals of the best interpolation from ``BESIDE`` even samples on each side."""
     n = 2 * BESIDE + 1
     windows = np.lib.stride_tricks.sliding_window_view(theta, n)
-    pairs = windows[:, :BESIDE] + windows[:, : BESIDE : -1]
+    pairs = windows[:, :BESIDE] + windows[:, :BESIDE:-1]
     columns = np.column_stack([np.ones(len(pairs)), pairs])
     middle, right = windows[:, BESIDE], np.ones(len(pairs), bool)
     for _ in range(3):
