@@ -17,7 +17,7 @@ from pendmap.formatting import counted, moment
 from pendmap.records.clock import longest_between
 from pendmap.records.noise import DEGREES, fastest
 from pendmap.records.rod_sensors import angle_of_rate
-from pendmap.records.slips import MOST_INTERVALS, slips_of, suspected
+from pendmap.records.slips import MOST_INTERVALS, slips_of
 from pendmap.records.steps import interpolated, sides_of
 from pendmap.records.work import Jump
 from pendmap.signal.local_polynomial import POINTS, local_fit
@@ -167,12 +167,7 @@ def _suspects(time: Floats, theta: Floats, count: float) -> tuple[Indices, Float
         size, 2 * best.neighbours + 1, mode="nearest"
     )  # of windows in common
     which = (size > limit * scale + 2 * count) & (size >= highest)
-    at, scale = best.middle[which], scale[which]
-    if limit == SUSPECT_SLOW:
-        more = np.setdiff1d(suspected(time, theta), at)
-        scale = np.append(scale, np.full(more.size, broad_scale(np.abs(best.residual))))
-        at = np.append(at, more)
-    return at, scale
+    return best.middle[which], scale[which]
 
 
 def _judge(

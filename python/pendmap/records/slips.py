@@ -78,19 +78,6 @@ def slips_of(time: Floats, theta: Floats, fewest: int = FEWEST_SLIPS) -> Slips |
     return Slips(mended, np.unique(places), slip, stderr)
 
 
-def suspected(time: Floats, theta: Floats) -> Indices:
-    """Return the samples after what may be slips of any size; none with few samples a swing."""
-    from scipy.interpolate import CubicSpline
-
-    interval = float(np.median(np.diff(time)))
-    reach = min(int(SLIP_PHASE / (fastest(time, theta, 0.0)[0] * interval)), LONGEST_SIDE)
-    if reach < SHORTEST_SIDE or time.size < 20 * reach or not np.all(np.diff(time) > 0):
-        return np.empty(0, np.intp)
-    grid = np.arange(time[0], time[-1] + interval / 2, interval)
-    at, _ = _found(CubicSpline(time, theta)(grid), reach, CERTAIN_SLIP[0])
-    return np.searchsorted(time, grid[at] - interval / 2)
-
-
 def _found(values: Floats, reach: int, limit: float) -> tuple[Indices, Floats]:
     """Return the first samples after slips, and the apparent sizes in intervals."""
     from scipy.ndimage import maximum_filter1d

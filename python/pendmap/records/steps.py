@@ -172,4 +172,8 @@ def _fitted(time: Floats, theta: Floats, after: Floats, frequency: float) -> _Fi
         fit.settle(time, theta, after)
     columns = fit.columns(time, after)
     fit.normal = columns.T @ columns
+    # Neighbours that are wrong together are worth fewer readings.
+    left = theta - columns[:, :-3] @ fit.unknown[:-3]
+    alike = min(max(float(left[1:] @ left[:-1]) / float(left @ left), 0.0), 0.9)
+    fit.normal *= (1 - alike) / (1 + alike)
     return fit
