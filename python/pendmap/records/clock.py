@@ -121,9 +121,11 @@ def coarse(work: Work) -> Finding | None:
     if not rise.size or (same and np.mean(again) > 0.9):
         return None
     ticks = _ticks(work.time, rise, steps, channels, same=same)
-    if ticks is None:
-        return None if same else _scattered(work, channels)
-    tick, even = ticks
+    return _scattered(work, channels) if ticks is None else _in_ticks(work, channels, *ticks)
+
+
+def _in_ticks(work: Work, channels: Floats, tick: float, even: _Even) -> Finding | None:
+    """Space the readings of stamps in exact ticks evenly, if the motion does not follow them."""
     missing, few = "", ""
     place = np.arange(work.time.size)
     slips = slips_of(even.times, work.theta, fewest=1)
@@ -132,11 +134,10 @@ def coarse(work: Work) -> Finding | None:
         if (whole := _even(work.time, place + lost, tick)).missed <= max(even.missed, 0.0):
             even = whole
             missing = f", {counted(int(lost[-1]), 'reading')} lost where the others jump"
-    work.clock_stderr = even.stderr / even.interval
     share, error, _ = _followed(work.time, even, channels)
     if share - CERTAIN_SHARE * error > 0.5:
-        work.clock_stderr = 0.0
         return None
+    work.clock_stderr = even.stderr / even.interval
     if even.missed <= even.interval:
         rate = estimate_text(Estimate(1 / even.interval, work.clock_stderr / even.interval))
         work.time = even.times
@@ -227,8 +228,8 @@ def _scattered(work: Work, channels: Floats) -> Finding | None:
     even, (share, error, _) = lines[which], tries[which]
     off = work.time - even.times
     runs = np.convolve(off, np.ones(STAMPS) / STAMPS, "valid")
-    wanders = np.ptp(runs) > LATE * even.interval
-    if wanders or share + CERTAIN_SHARE * error > 0.5 or slips_of(even.times, work.theta, fewest=1):
+    steady = np.ptp(runs) < LATE * even.interval and share + CERTAIN_SHARE * error < 0.5
+    if not steady or slips_of(even.times, work.theta, fewest=1):
         return None
     width, lost = even.missed, round((even.times[-1] - even.times[0]) / even.interval - place[-1])
     work.time, work.clock_stderr = even.times, even.stderr / even.interval

@@ -42,6 +42,7 @@ WEIGHT_STEPS: Final = 10  # Iterations of the weights of least absolute deviatio
 CERTAIN_JUMP: Final = 7.0  # Standard errors above which a step is a jump
 OFF_COUNT: Final = 0.25  # Greatest deviation of a corrected jump from whole counts, counts
 MOST_JUMPS: Final = 20  # Most jumps that are corrected
+OFF_FRAME: Final = 0.05  # Greatest deviation of a slip from half or whole frames, frames
 OFF_TURN: Final = 0.1  # Greatest deviation of a jump from whole turns, rad
 OTHER_RECORD: Final = 0.5  # Size of a jump, rad, above which a second recording may begin
 END_SAMPLES: Final = 10  # Samples of each end that are compared with predictions
@@ -60,17 +61,18 @@ def outliers(work: Work) -> Finding | None:
     false, jumps = np.zeros(theta.size, bool), list[Jump]()
     # The motion has corners next to clipped or frozen samples.
     corner = widened(bad, SIDE)
-    seen = corner.copy()
+    judged = corner.copy()
     for _ in range(PASSES):
-        at, scale = _suspects(time, theta, work.count)
-        at, scale = at[~seen[at]], scale[~seen[at]]
+        seen = dataclasses.replace(work, time=time, theta=theta, trusted=~(bad | false))
+        at, scale = _suspects(seen)
+        at, scale = at[~judged[at]], scale[~judged[at]]
         if at.size + np.count_nonzero(false) > MOST_OUTLIERS * theta.size:
             return work.finding("not-smooth", percent=100 * MOST_OUTLIERS)
-        verdicts = _judged(time, theta, ~(bad | false), at, scale, work.count)
+        verdicts = _judged(seen, at, scale)
         if not verdicts:
             break
         for k, group, jump in verdicts:
-            seen[k] = True
+            judged[k] = True
             false[group] = True
             if jump is not None:
                 jumps.append(jump)
@@ -95,48 +97,47 @@ def _bridge(time: Floats, theta: Floats, false: Mask) -> None:
         theta[false] = np.interp(time[false], time[~false], theta[~false])
 
 
-def _by_sides(
-    time: Floats, theta: Floats, good: Mask, k: int, verdict: Verdict, count: float
-) -> Verdict:
+def _by_sides(seen: Work, k: int, verdict: Verdict) -> Verdict:
     """Return the outliers and the jump around ``k`` by the swings on both sides of it."""
     group, jump = verdict
-    if jump is None and not _slow(time, theta, count):
-        return group, jump
-    frequency, interval = fastest(time, theta, count)[1], float(np.median(np.diff(time)))
-    places = np.arange(time.size)[group]
-    low, high = min([k - NEAR, *(places - 1)]), max([k + NEAR + 1, *(places + 2)])
-    sides = sides_of(time, theta, good, slice(max(low, 0), high), frequency, count)
-    if sides is None:
-        return group, jump
-    at, limit = sides.at, CERTAIN_JUMP**2
-    if sides.both < limit:
-        return np.flatnonzero(sides.false), None
-    if min(sides.steps, sides.slips) > limit:
-        return group, jump
-    group = np.flatnonzero(sides.false)
-    if sides.steps > sides.slips:
-        return group, Jump(at, sides.step, sides.step_error, certain=True)
-    if abs(sides.slip) > (MOST_INTERVALS + 0.5) * interval:
+    if jump is None and not _slow(seen):
         return verdict
-    halves = round(2 * sides.slip / interval) * interval / 2
-    near = abs(sides.slip - halves) < 3 * sides.slip_error
-    return group, Jump(at, 0.0, 0.0, halves if near and halves else sides.slip, certain=True)
+    places = np.arange(seen.time.size)[group]
+    low, high = min([k - NEAR, *(places - 1)]), max([k + NEAR + 1, *(places + 2)])
+    between = slice(max(low, 0), high)
+    sides = sides_of(seen.time, seen.theta, seen.trusted, between, seen.count)
+    limit = CERTAIN_JUMP**2
+    if sides is None or min(sides.steps, sides.slips) > limit:
+        return verdict
+    group = np.flatnonzero(sides.false)
+    if sides.both < limit:
+        return group, None
+    if sides.steps > sides.slips:
+        return group, Jump(sides.at, sides.step, sides.step_error, certain=True)
+    # A clock slips by frames, or by half of one.
+    interval = float(np.median(np.diff(seen.time)))
+    slip = round(2 * sides.slip / interval) * interval / 2
+    near = abs(sides.slip - slip) < 3 * sides.slip_error + OFF_FRAME * interval
+    if not slip or not near or abs(slip) > MOST_INTERVALS * interval:
+        return verdict
+    return group, Jump(sides.at, 0.0, 0.0, slip)
 
 
-def _slow(time: Floats, theta: Floats, count: float) -> bool:
+def _slow(seen: Work) -> bool:
     """Return whether the sampling is too slow for cubics."""
-    return SIDE * fastest(time, theta, count)[1] * float(np.median(np.diff(time))) > FARTHEST_CUBIC
+    phase = fastest(seen.time, seen.theta, seen.count)[1] * float(np.median(np.diff(seen.time)))
+    return SIDE * phase > FARTHEST_CUBIC
 
 
 def _judged(
-    time: Floats, theta: Floats, good: Mask, at: Indices, scale: Floats, count: float
+    seen: Work, at: Indices, scale: Floats
 ) -> list[tuple[int, slice | Indices, Jump | None]]:
     """Return suspects, with outliers and jumps; jumps near outliers are judged after them."""
     verdicts = [
-        (k, *_by_sides(time, theta, good, k, _judge(time, theta, k, sigma, count), count))
+        (k, *_by_sides(seen, k, _judge(seen.time, seen.theta, k, sigma, seen.count)))
         for k, sigma in zip(at.tolist(), scale.tolist(), strict=True)
     ]
-    spikes = np.array([k for k, group, jump in verdicts if jump is None and theta[group].size])
+    spikes = np.array([k for k, group, jump in verdicts if jump is None and seen.rows[group].size])
     return [
         (k, group, jump)
         for k, group, jump in verdicts
@@ -144,10 +145,11 @@ def _judged(
     ]
 
 
-def _suspects(time: Floats, theta: Floats, count: float) -> tuple[Indices, Floats]:
+def _suspects(seen: Work) -> tuple[Indices, Floats]:
     """Return samples far from their neighbours, and the standard deviation around each."""
     from scipy.ndimage import maximum_filter1d, median_filter
 
+    time, theta = seen.time, seen.theta
     best, *others = (
         local_fit(time, theta, degree=degree, points=points) for degree, points in DEGREES[:3]
     )
@@ -158,7 +160,7 @@ def _suspects(time: Floats, theta: Floats, count: float) -> tuple[Indices, Float
     if size.size < POINTS:
         return np.empty(0, np.intp), np.empty(0)
     limit = SUSPECT
-    if _slow(time, theta, count):  # what the swings on both sides do not confirm is dropped
+    if _slow(seen):  # what the swings on both sides do not confirm is dropped
         limit = SUSPECT_SLOW
         size = np.maximum(size, np.abs(np.diff(best.residual, prepend=best.residual[0])) / 2**0.5)
     near = 1.4826 * median_filter(size, size=min(SCALE_SAMPLES, size.size), mode="nearest")
@@ -166,7 +168,7 @@ def _suspects(time: Floats, theta: Floats, count: float) -> tuple[Indices, Float
     highest = maximum_filter1d(
         size, 2 * best.neighbours + 1, mode="nearest"
     )  # of windows in common
-    which = (size > limit * scale + 2 * count) & (size >= highest)
+    which = (size > limit * scale + 2 * seen.count) & (size >= highest)
     return best.middle[which], scale[which]
 
 
@@ -261,18 +263,14 @@ def _slips_of_jumps(work: Work) -> Finding | None:
     sizes = ", ".join(f"{1e3 * jump.slip:+.3g}" for jump in late[:4])
     at = np.array([jump.at for jump in late])
     finding = work.finding("time-slips.each", at=at, slips=counted(at.size, "slip"), sizes=sizes)
-    time = work.time.copy()
     for jump in late:
-        time[jump.at :] += jump.slip
+        work.time[jump.at :] += jump.slip
     # A frame that comes twice has the time of the one before.
-    early = np.minimum.accumulate(time[::-1])[::-1]
-    again = np.append(time[:-1] > early[1:] - 0.1 * np.median(np.diff(time)), False)
-    work.time = time
+    early = np.minimum.accumulate(work.time[::-1])[::-1]
+    again = np.append(np.diff(early) < OFF_FRAME * np.median(np.diff(work.time)), False)
     if again.any():
-        work.jumps = [
-            dataclasses.replace(jump, at=jump.at - int(again[: jump.at].sum()))
-            for jump in work.jumps
-        ]
+        before = np.cumsum(again)
+        work.jumps = [dataclasses.replace(j, at=j.at - int(before[j.at - 1])) for j in work.jumps]
         work.bridged = work.bridged[~again]
         work.keep(~again)
     return finding
@@ -298,7 +296,8 @@ def jumps(work: Work) -> Finding | None:
             work.theta[at:] -= steps * step
         by = ", ".join(f"{count:+d}" for count in counts[:4])
         return work.finding(key, at=places, jumps=number, counts=by)
-    if all(jump.certain for jump in work.jumps):
+    noise = normal_scale(local_fit(work.time, work.bridged).residual)
+    if all(jump.certain and jump.error < max(noise, OFF_COUNT * work.count) for jump in work.jumps):
         for jump in work.jumps:
             work.theta[jump.at :] -= jump.size
         errors = [f"{j.size:+.3g} +- {j.error:.1g}" for j in work.jumps[:4]]

@@ -1,8 +1,8 @@
 """Steps of a reading, and slips of its clock, against swings fitted on both sides of them.
 
-Around an instant, readings of a free swing are fitted by harmonics of a chirp whose amplitude changes,
-``sum_m A_m(u) exp(i m (w u + b u^2))``, with a zero that changes by ``step`` and a time that changes
-by ``slip``, ``u = t + slip``. A reading that is false leaves both at zero.
+Around an instant, a free swing is fitted by harmonics of a chirp whose amplitude changes,
+``sum_m A_m(u) exp(i m (w u + b u^2))``, with a zero that changes by ``step``, and a time that
+changes by ``slip``: ``u = t + slip``. A reading that is false leaves both at zero.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendmap.records.noise import fastest
 from pendmap.signal.local_polynomial import LocalFit
 from pendmap.signal.robust import broad_scale, normal_scale
 
@@ -60,10 +61,9 @@ class Sides:
     at: int  # first reading after the change
 
 
-def sides_of(
-    time: Floats, theta: Floats, good: Mask, between: slice, frequency: float, count: float
-) -> Sides | None:
+def sides_of(time: Floats, theta: Floats, good: Mask, between: slice, count: float) -> Sides | None:
     """Return the change of a swing over the readings ``between``; None if no swing is followed."""
+    frequency = fastest(time, theta, count)[1]
     centre, reach = time[between].mean(), 2 * math.pi * PERIODS / frequency
     low, high = np.searchsorted(time, (centre - reach, centre + reach))
     rows = np.arange(low, high)

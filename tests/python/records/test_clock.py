@@ -43,7 +43,7 @@ def test_a_pause_longer_than_all_the_rest_cuts_the_record(tmp_path: Path, *, lat
 
 
 def test_jitter_is_measured_also_where_stamps_hide_it(tmp_path: Path) -> None:
-    time, theta = clean()
+    time, _ = clean()
     off = np.random.default_rng(2).normal(0, 5e-4, time.size)
     fine, angle, _ = motion(rate=2000.0)
     true = text((time + off, np.interp(time + off, fine, angle)))
@@ -179,8 +179,8 @@ def test_the_frequency_is_within_its_errors(tick: float, lost: int) -> None:
 
 
 SCATTER = {
-    "longer ticks": lambda time, rng: np.floor(time / 0.0312) * 0.0312,
-    "shorter ticks": lambda time, rng: np.floor(time / 0.015625) * 0.015625,
+    "longer ticks": lambda time, _: np.floor(time / 0.0312) * 0.0312,
+    "shorter ticks": lambda time, _: np.floor(time / 0.015625) * 0.015625,
     "noise": lambda time, rng: time + rng.normal(0, 2e-3, time.size),
 }
 
