@@ -18,7 +18,7 @@ from pendmap.records.clock import longest_between
 from pendmap.records.noise import DEGREES, fastest
 from pendmap.records.rod_sensors import angle_of_rate
 from pendmap.records.slips import MOST_INTERVALS, slips_of
-from pendmap.records.steps import interpolated, sides_of
+from pendmap.records.steps import sides_of
 from pendmap.records.work import Jump
 from pendmap.signal.local_polynomial import POINTS, local_fit
 from pendmap.signal.robust import broad_scale, normal_scale, widened
@@ -150,10 +150,8 @@ def _suspects(seen: Work) -> tuple[Indices, Floats]:
     from scipy.ndimage import maximum_filter1d, median_filter
 
     time, theta = seen.time, seen.theta
-    best, *others = (
-        local_fit(time, theta, degree=degree, points=points) for degree, points in DEGREES[:3]
-    )
-    for other in (*others, interpolated(theta)):
+    best, *others = (local_fit(time, theta, degree=d, points=points) for d, points in DEGREES)
+    for other in others:
         if normal_scale(other.residual) < 0.7 * normal_scale(best.residual):
             best = other
     size = np.abs(best.residual)

@@ -14,13 +14,11 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.records.noise import fastest
-from pendmap.signal.local_polynomial import LocalFit
-from pendmap.signal.robust import broad_scale, normal_scale
+from pendmap.signal.robust import normal_scale
 
 if TYPE_CHECKING:
     from pendmap.signal import Floats, Mask
 
-BESIDE: Final = 5  # Samples on each side from which one is interpolated
 PERIODS: Final = 2.25  # Periods on each side that are fitted
 FEWEST: Final = 10  # Fewest readings on each side
 MOST: Final = 150  # Most readings on each side that are fitted
@@ -30,29 +28,13 @@ FALSE: Final = 5.0  # Standard deviations of a reading that is false
 WORST: Final = 0.1  # Greatest residual over the rms swing of a motion that is followed
 
 
-def interpolated(theta: Floats) -> LocalFit:
-    """Return residuals of the best interpolation from ``BESIDE`` even samples on each side."""
-    n = 2 * BESIDE + 1
-    windows = np.lib.stride_tricks.sliding_window_view(theta, n)
-    pairs = windows[:, :BESIDE] + windows[:, :BESIDE:-1]
-    columns = np.column_stack([np.ones(len(pairs)), pairs])
-    middle, right = windows[:, BESIDE], np.ones(len(pairs), bool)
-    for _ in range(3):
-        weights = np.linalg.lstsq(columns[right], middle[right], rcond=1e-9)[0]
-        left = middle - columns @ weights
-        right = np.abs(left) <= FALSE * broad_scale(np.abs(left))
-    gain = math.sqrt(1 + 2 * float(weights[1:] @ weights[1:]))
-    place = np.arange(BESIDE, theta.size - BESIDE)
-    return LocalFit(place, left / gain, np.zeros(left.size), BESIDE, 1.0, np.full(n, 1 / n))
-
-
 @dataclasses.dataclass(frozen=True)
 class Sides:
     """Change of a motion from before an instant to after it."""
 
-    step: float  # of the zero, rad, without a slip
+    step: float  # of the zero, rad, if there is no slip
     step_error: float
-    slip: float  # of the time, s, without a step
+    slip: float  # of the time, s, if there is no step
     slip_error: float
     steps: float  # decrease of chi squared by a step, beside a slip
     slips: float  # decrease of chi squared by a slip, beside a step
@@ -76,9 +58,10 @@ def sides_of(time: Floats, theta: Floats, good: Mask, between: slice, count: flo
     fit = _fitted(scale, theta[used], (used >= between.stop) * 1.0, frequency * reach)
     if fit is None or fit.sigma > WORST * float(np.std(theta[used])):
         return None
-    sigma = max(fit.sigma, count / math.sqrt(12))
-    weight = np.linalg.pinv(fit.normal)[[[1], [-1]], [1, -1]] * sigma**2
-    change, (a, c), b = fit.unknown[[1, -1]], np.diag(weight), weight[0, 1]
+    sigma = max(fit.sigma, count / math.sqrt(12), 1e-9)
+    inverse = np.linalg.pinv(fit.normal) * sigma**2
+    (step, slip), a, b, c = fit.unknown[[1, -1]], inverse[1, 1], inverse[1, -1], inverse[-1, -1]
+    alone = max(a * c - b * b, 1e-300)
     # Readings between the sides belong to the one before up to a place, and to the other after.
     inner = np.arange(between.start, between.stop)
     off = np.abs(
@@ -92,13 +75,13 @@ def sides_of(time: Floats, theta: Floats, good: Mask, between: slice, count: flo
     false = np.zeros(time.size, bool)
     false[inner[far]] = True
     return Sides(
-        step=change[0] - b / c * change[1],
-        step_error=math.sqrt(a - b * b / c),
-        slip=(change[1] - b / a * change[0]) * reach,
-        slip_error=math.sqrt(c - b * b / a) * reach,
-        steps=change[0] ** 2 / a,
-        slips=change[1] ** 2 / c,
-        both=float(change @ np.linalg.solve(weight, change)),
+        step=step - b / c * slip,
+        step_error=math.sqrt(alone / c),
+        slip=(slip - b / a * step) * reach,
+        slip_error=math.sqrt(alone / a) * reach,
+        steps=step**2 / a,
+        slips=slip**2 / c,
+        both=(c * step**2 - 2 * b * step * slip + a * slip**2) / alone,
         false=false,
         at=between.start + split,
     )
@@ -146,30 +129,26 @@ _TERMS: Final = ((1, 0), (1, 1), (1, 2), (2, 0), (3, 0))  # Harmonic and power o
 def _fitted(time: Floats, theta: Floats, after: Floats, frequency: float) -> _Fit | None:
     """Return the fit of the motion, without false readings; None if it does not converge."""
     size = 2 + 2 * len(_TERMS) + 3
-    if time.size < size + 3:
-        return None
-    starts = []
-    for share in FREQUENCIES:
-        fit = _Fit(np.append(np.zeros(size - 3), [share * frequency, 0.0, 0.0]))
+    starts = [_Fit(np.append(np.zeros(size - 3), [x * frequency, 0.0, 0.0])) for x in FREQUENCIES]
+    for fit in starts:
         fit.settle(time, theta, after)
-        starts.append(fit)
     fit = min(starts, key=lambda fit: fit.sigma)
     for _ in range(2):
         for _ in range(ROUNDS):
             columns = fit.columns(time, after)
             left = theta - columns[:, :-3] @ fit.unknown[:-3]
             fit.unknown = fit.unknown + np.linalg.lstsq(columns, left, rcond=1e-9)[0]
+            if not np.all(np.abs(fit.unknown) < 1e9):
+                return None
             fit.settle(time, theta, after)
         away = np.abs(theta - fit.model(time, after))
-        right = away <= FALSE * max(normal_scale(away), 1e-12) * math.sqrt(
-            time.size / (time.size - size)
-        )
-        if right.sum() < size + 3 or not math.isfinite(fit.sigma):
+        worth = math.sqrt(time.size / max(time.size - size, 1))
+        right = away <= FALSE * worth * max(normal_scale(away), 1e-12)
+        if right.sum() < size + 3:
             return None
-        if right.all():
-            break
-        time, theta, after = time[right], theta[right], after[right]
-        fit.settle(time, theta, after)
+        if not right.all():
+            time, theta, after = time[right], theta[right], after[right]
+            fit.settle(time, theta, after)
     columns = fit.columns(time, after)
     fit.normal = columns.T @ columns
     # Neighbours that are wrong together are worth fewer readings.
