@@ -192,7 +192,7 @@ TIMES = {
     "one stamp of zero": said(arrays(lambda t, a: (at(t, 400, 0.0), a)), "time-backwards"),
     "stamps twice": said(arrays(lambda t, a: (np.repeat(t, 2), np.repeat(a, 2))), "time-duplicate"),
     "a coarse clock": said(arrays(lambda t, a: (np.floor(t / 0.03) * 0.03, a)), "time-coarse"),
-    "jitter": said(arrays(lambda t, a: (t + RNG.normal(0, 1e-3, t.size), a)), "time-jitter"),
+    "jitter": said(arrays(lambda t, a: (t + RNG.normal(0, 1e-3, t.size), a)), "time-coarse"),
     "a gap": said(arrays(lambda t, a: (np.delete(t, slice(300, 350)), np.delete(a, slice(300, 350)))), "time-gap"),
     "uneven": said(arrays(lambda t, a: _lossy(t, a, 0.4)), "time-uneven"),
     "milliseconds": said(arrays(lambda t, a: (t * 1e3, a)), "time-unit"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
+import operator
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -12,15 +13,18 @@ import numpy as np
 from pendmap.errors import InputError
 from pendmap.formatting import Estimate, counted, estimate_text, listed, moment
 from pendmap.records.by_hand import by_hand
+from pendmap.records.noise import OUTLIER, raise_degree
 from pendmap.records.resolution import FEWEST_EDGES, logs_edges, spread_stamps
 from pendmap.records.slips import slips_of
 from pendmap.records.work import FEWEST_SAMPLES
-from pendmap.signal.robust import intervals_of
+from pendmap.signal.local_polynomial import local_fit
+from pendmap.signal.robust import broad_scale, intervals_of
 
 if TYPE_CHECKING:
     from pendmap.records.experiment import Finding
     from pendmap.records.work import Work
     from pendmap.signal import Floats, Indices, Stretch
+    from pendmap.signal.local_polynomial import LocalFit
 
 RESTART: Final = 10  # Least decrease at a clock's restart, intervals; fewest samples of each part
 REPORTED_JITTER: Final = 0.02  # Relative spread of the intervals above which jitter is reported
@@ -29,6 +33,11 @@ STOPPED_READINGS: Final = 50  # Most readings with one stamp (or ten times the u
 COARSE_STAMPS: Final = 0.2  # Least share of repeated stamps of a coarse clock
 SPACING: Final = frozenset(("time-gap", "time-jitter", "time-uneven"))  # Findings about intervals
 AROUND: Final = 101  # Readings around one whose second differences are usual there
+SMOOTHER: Final = 0.98  # Residual, over that with lost readings, of a record without
+CERTAIN_SHARE: Final = 3.0  # Standard errors by which a motion follows even times or its stamps
+STAMPS: Final = 16  # Stamps on each side of an interval whose means show a lost reading
+PLACINGS: Final = 8  # Searches for lost readings; each may reveal one next to another
+LATE: Final = 0.6  # Intervals by which stamps that follow a lost reading are late on average
 EXACT: Final = 1e-6  # Share of a tick below which a distance is rounding
 
 
@@ -116,9 +125,11 @@ def coarse(work: Work) -> Finding | None:
     if not rise.size or (same and np.mean(again) > 0.9):
         return None
     ticks = _ticks(work.time, rise, steps, channels, same=same)
-    if ticks is None:
-        return None
-    tick, even = ticks
+    return _scattered(work, channels) if ticks is None else _in_ticks(work, channels, *ticks)
+
+
+def _in_ticks(work: Work, channels: Floats, tick: float, even: _Even) -> Finding | None:
+    """Space the readings of stamps in exact ticks evenly, if the motion does not follow them."""
     missing, few = "", ""
     place = np.arange(work.time.size)
     slips = slips_of(even.times, work.theta, fewest=1)
@@ -127,11 +138,16 @@ def coarse(work: Work) -> Finding | None:
         if (whole := _even(work.time, place + lost, tick)).missed <= max(even.missed, 0.0):
             even = whole
             missing = f", {counted(int(lost[-1]), 'reading')} lost where the others jump"
+    share, error, _ = _followed(work.time, even, channels)
+    if share - CERTAIN_SHARE * error > 0.5:
+        return None
     work.clock_stderr = even.stderr / even.interval
     if even.missed <= even.interval:
         rate = estimate_text(Estimate(1 / even.interval, work.clock_stderr / even.interval))
         work.time = even.times
         return work.finding("time-coarse.even", tick=tick, lost=missing, rate=rate)
+    if slips is None and (scattered := _scattered(work, channels)) is not None:
+        return scattered
     _, number = np.unique(work.time, return_counts=True)
     out = np.repeat(number < np.median(number) - 1, number)
     work.time = spread_stamps(work.time)
@@ -202,6 +218,104 @@ def _even(time: Floats, place: Indices, tick: float) -> _Even:
     left = y - slope * x
     times = time[0] + (left.max() + left.min() + tick) / 2 + (usual + slope) * place
     return _Even(usual + slope, spread, times, missed)
+
+
+def _scattered(work: Work, channels: Floats) -> Finding | None:
+    """Space readings evenly if the motion shows that they are, and their stamps scatter."""
+    if work.time.size < FEWEST_EDGES:
+        return None
+    place = np.arange(work.time.size, dtype=float)
+    lines = [_line(work.time, places) for places in (_with_lost(work.time, place), place)]
+    tries = [_followed(work.time, line, channels) for line in lines]
+    # Stamps show lost readings, unless the motion is clearly smoother without them.
+    which = int(tries[1][2] < SMOOTHER * tries[0][2])
+    even, (share, error, _) = lines[which], tries[which]
+    off = work.time - even.times
+    runs = np.convolve(off, np.ones(STAMPS) / STAMPS, "valid")
+    steady = np.ptp(runs) < LATE * even.interval and share + CERTAIN_SHARE * error < 0.5
+    if not steady or slips_of(even.times, work.theta, fewest=1):
+        return None
+    width, lost = even.missed, round((even.times[-1] - even.times[0]) / even.interval - place[-1])
+    work.time, work.clock_stderr = even.times, even.stderr / even.interval
+    rate = estimate_text(Estimate(1 / even.interval, work.clock_stderr / even.interval))
+    missing = f", {counted(lost, 'reading')} lost" if lost else ""
+    return work.finding("time-coarse.scatter", width=width, lost=missing, rate=rate)
+
+
+def _line(time: Floats, place: Floats) -> _Even:
+    """Return the even times nearest to stamps; ``missed`` is the range of the differences."""
+    far = place - place.mean()
+    interval = float(far @ time) / float(far @ far)
+    times = time.mean() + interval * far
+    # Stamps of one tick are alike: the error is that of independent means of blocks.
+    block = math.isqrt(time.size)
+    means = (time - times)[: block * block].reshape(block, block).mean(axis=1)
+    spread = max(float(np.std(time - times)), math.sqrt(block) * float(np.std(means)))
+    stderr = spread / math.sqrt(float(far @ far))
+    return _Even(interval, stderr, times, float(np.ptp(time - times)))
+
+
+def _with_lost(time: Floats, place: Floats) -> Floats:
+    """Return the places of readings, of which some are lost where all later stamps are late."""
+    from scipy.ndimage import maximum_filter1d
+
+    places, beside = place.copy(), min(STAMPS, time.size // 8)
+    edge = np.arange(3, time.size - 2)
+    low, high = np.maximum(edge - beside, 0), np.minimum(edge + beside, time.size)
+
+    def steps(values: Floats) -> Floats:
+        """Return the means after each interval less the means before."""
+        sums = np.concatenate(([0.0], np.cumsum(values - values[0])))
+        before = (sums[edge] - sums[low]) / (edge - low)
+        return np.asarray((sums[high] - sums[edge]) / (high - edge) - before)
+
+    usual = float(np.median(time[4 * beside :] - time[: -4 * beside])) / (4 * beside)
+    for _ in range(PLACINGS):
+        step, lag = steps(time), steps(places)
+        sound = np.abs(step / usual - lag) < 0.5
+        usual = float(np.sum(step[sound]) / np.sum(lag[sound])) if sound.any() else usual
+        late = step / usual - lag
+        size = np.abs(late)
+        at = np.flatnonzero((size > LATE) & (size >= maximum_filter1d(size, 2 * beside + 1)))
+        for k, lost in zip(edge[at], late[at], strict=True):
+            places[k:] += round(lost) if abs(lost) < RESTART else lost
+    line = _line(time, places)
+    nearest = np.round((time - line.times[0]) / line.interval)
+    for better in (nearest, places):
+        if np.all(np.diff(better) > 0.5) and _line(time, better).missed <= line.missed:
+            return better
+    return place
+
+
+def _followed(time: Floats, even: _Even, channels: Floats) -> tuple[float, float, float]:
+    """Return what :func:`_share` does, of the channel that determines the share best."""
+    off = time - even.times
+    return min((_share(even.times, off, v) for v in channels), key=operator.itemgetter(1))
+
+
+def _share(times: Floats, off: Floats, values: Floats) -> tuple[float, float, float]:
+    """Return the share of the stamps' scatter that a motion follows, its error, and the residual.
+
+    About even times a reading is ``s(t) + share v off``: the share is 1 if the stamps are the
+    instants of the readings, and 0 if the even times are.
+    """
+
+    def fitted(degree: int = 4, points: int = 9) -> LocalFit:
+        fit = local_fit(times, values, degree=degree, points=points)
+        size = np.abs(fit.residual)
+        return fit.only(size <= OUTLIER * broad_scale(size))
+
+    fit = raise_degree(fitted, fitted())
+    if fit.middle.size < FEWEST_EDGES:
+        return 1.0, math.inf, math.inf
+    moved = np.interp(np.arange(times.size), fit.middle, fit.slope) * off
+    points = 2 * fit.neighbours + 1
+    other = local_fit(times, moved, degree=points - 5, points=points)
+    follows = np.interp(fit.middle, other.middle, other.residual)
+    power = max(float(follows @ follows), 1e-300)
+    share = float(follows @ fit.residual) / power
+    left = float(np.mean((fit.residual - share * follows) ** 2))
+    return share, math.sqrt(left * fit.sum_of_squares / power), fit.rms
 
 
 def repeated(work: Work) -> Finding | None:

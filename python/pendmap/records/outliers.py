@@ -7,6 +7,7 @@ an outlier two. Samples at an end of a record or a gap are judged by a cubic.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from typing import TYPE_CHECKING, Final
 
@@ -14,9 +15,10 @@ import numpy as np
 
 from pendmap.formatting import counted, moment
 from pendmap.records.clock import longest_between
-from pendmap.records.noise import DEGREES
+from pendmap.records.noise import DEGREES, fastest
 from pendmap.records.rod_sensors import angle_of_rate
-from pendmap.records.slips import slips_of
+from pendmap.records.slips import MOST_INTERVALS, slips_of
+from pendmap.records.steps import sides_of
 from pendmap.records.work import Jump
 from pendmap.signal.local_polynomial import POINTS, local_fit
 from pendmap.signal.robust import broad_scale, normal_scale, widened
@@ -26,7 +28,11 @@ if TYPE_CHECKING:
     from pendmap.records.work import Work
     from pendmap.signal import Floats, Indices, Mask
 
+    Verdict = tuple[slice | Indices, Jump | None]
+
 SUSPECT: Final = 10.0  # Local standard deviations of a residual above which it is examined
+SUSPECT_SLOW: Final = 6.0  # The same where sampling is too slow for cubics
+NEAR: Final = 4  # Readings on each side of a suspect that may be false as well
 SCALE_SAMPLES: Final = 151  # Samples from which the local standard deviation is estimated
 PASSES: Final = 8  # Most searches for outliers; each may reveal one next to another
 MOST_OUTLIERS: Final = 0.1  # Greatest share of outliers; with more, no sample is marked
@@ -36,41 +42,45 @@ WEIGHT_STEPS: Final = 10  # Iterations of the weights of least absolute deviatio
 CERTAIN_JUMP: Final = 7.0  # Standard errors above which a step is a jump
 OFF_COUNT: Final = 0.25  # Greatest deviation of a corrected jump from whole counts, counts
 MOST_JUMPS: Final = 20  # Most jumps that are corrected
+OFF_FRAME: Final = 0.05  # Greatest deviation of a slip from half or whole frames, frames
 OFF_TURN: Final = 0.1  # Greatest deviation of a jump from whole turns, rad
 OTHER_RECORD: Final = 0.5  # Size of a jump, rad, above which a second recording may begin
 END_SAMPLES: Final = 10  # Samples of each end that are compared with predictions
 END_GAP: Final = POINTS // 2  # Longest gap, intervals, that windows cross
+FARTHEST_CUBIC: Final = 1.5  # Phase of a side, rad, above which a cubic does not follow a swing
 PREDICTIONS: Final = 40  # Predictions further inside that give the usual error
 END_DEGREES: Final = (2, 3)  # Degrees of the predicting polynomials
 
 
 def outliers(work: Work) -> Finding | None:
     """Mark outliers, and note the jumps of the reading."""
-    theta, bad = work.theta.copy(), ~work.trusted
+    time, theta, bad = work.time.copy(), work.theta.copy(), ~work.trusted
     if theta.size < 2 * POINTS or bad.all():
         return None
-    _bridge(work.time, theta, bad)
+    _bridge(time, theta, bad)
     false, jumps = np.zeros(theta.size, bool), list[Jump]()
     # The motion has corners next to clipped or frozen samples.
     corner = widened(bad, SIDE)
-    seen = corner.copy()
+    judged = corner.copy()
     for _ in range(PASSES):
-        at, scale = _suspects(work, theta)
-        at, scale = at[~seen[at]], scale[~seen[at]]
+        seen = dataclasses.replace(work, time=time, theta=theta, trusted=~(bad | false))
+        at, scale = _suspects(seen)
+        at, scale = at[~judged[at]], scale[~judged[at]]
         if at.size + np.count_nonzero(false) > MOST_OUTLIERS * theta.size:
             return work.finding("not-smooth", percent=100 * MOST_OUTLIERS)
-        verdicts = _judged(work, theta, at, scale)
+        verdicts = _judged(seen, at, scale)
         if not verdicts:
             break
         for k, group, jump in verdicts:
-            seen[k] = True
+            judged[k] = True
             false[group] = True
             if jump is not None:
                 jumps.append(jump)
                 theta[jump.at :] -= jump.size
-        _bridge(work.time, theta, false)
-    false |= ~corner & false_ends(work.time, theta, ~(bad | false), SUSPECT, work.count)
-    _bridge(work.time, theta, false)
+                time[jump.at :] += jump.slip
+        _bridge(time, theta, false)
+    false |= ~corner & false_ends(time, theta, ~(bad | false), SUSPECT, work.count)
+    _bridge(time, theta, false)
     work.jumps = sorted(jumps, key=lambda jump: jump.at)
     moved = np.zeros(theta.size)
     for jump in work.jumps:
@@ -87,15 +97,47 @@ def _bridge(time: Floats, theta: Floats, false: Mask) -> None:
         theta[false] = np.interp(time[false], time[~false], theta[~false])
 
 
+def _by_sides(seen: Work, k: int, verdict: Verdict) -> Verdict:
+    """Return the outliers and the jump around ``k`` by the swings on both sides of it."""
+    group, jump = verdict
+    if jump is None and not _slow(seen):
+        return verdict
+    places = np.arange(seen.time.size)[group]
+    low, high = min([k - NEAR, *(places - 1)]), max([k + NEAR + 1, *(places + 2)])
+    between = slice(max(low, 0), high)
+    sides = sides_of(seen.time, seen.theta, seen.trusted, between, seen.count)
+    limit = CERTAIN_JUMP**2
+    if sides is None or min(sides.steps, sides.slips) > limit:
+        return verdict
+    group = np.flatnonzero(sides.false)
+    if sides.both < limit:
+        return group, None
+    if sides.steps > sides.slips:
+        return group, Jump(sides.at, sides.step, sides.step_error, certain=True)
+    # A clock slips by frames, or by half of one.
+    interval = float(np.median(np.diff(seen.time)))
+    slip = round(2 * sides.slip / interval) * interval / 2
+    near = abs(sides.slip - slip) < 3 * sides.slip_error + OFF_FRAME * interval
+    if not slip or not near or abs(slip) > MOST_INTERVALS * interval:
+        return verdict
+    return group, Jump(sides.at, 0.0, 0.0, slip)
+
+
+def _slow(seen: Work) -> bool:
+    """Return whether the sampling is too slow for cubics."""
+    phase = fastest(seen.time, seen.theta, seen.count)[1] * float(np.median(np.diff(seen.time)))
+    return SIDE * phase > FARTHEST_CUBIC
+
+
 def _judged(
-    work: Work, theta: Floats, at: Indices, scale: Floats
+    seen: Work, at: Indices, scale: Floats
 ) -> list[tuple[int, slice | Indices, Jump | None]]:
     """Return suspects, with outliers and jumps; jumps near outliers are judged after them."""
     verdicts = [
-        (k, *_judge(work.time, theta, k, sigma, work.count))
+        (k, *_by_sides(seen, k, _judge(seen.time, seen.theta, k, sigma, seen.count)))
         for k, sigma in zip(at.tolist(), scale.tolist(), strict=True)
     ]
-    spikes = np.array([k for k, group, jump in verdicts if jump is None and theta[group].size])
+    spikes = np.array([k for k, group, jump in verdicts if jump is None and seen.rows[group].size])
     return [
         (k, group, jump)
         for k, group, jump in verdicts
@@ -103,25 +145,28 @@ def _judged(
     ]
 
 
-def _suspects(work: Work, theta: Floats) -> tuple[Indices, Floats]:
+def _suspects(seen: Work) -> tuple[Indices, Floats]:
     """Return samples far from their neighbours, and the standard deviation around each."""
     from scipy.ndimage import maximum_filter1d, median_filter
 
-    best, *others = (
-        local_fit(work.time, theta, degree=degree, points=points) for degree, points in DEGREES[:3]
-    )
+    time, theta = seen.time, seen.theta
+    best, *others = (local_fit(time, theta, degree=d, points=points) for d, points in DEGREES)
     for other in others:
         if normal_scale(other.residual) < 0.7 * normal_scale(best.residual):
             best = other
     size = np.abs(best.residual)
     if size.size < POINTS:
         return np.empty(0, np.intp), np.empty(0)
+    limit = SUSPECT
+    if _slow(seen):  # what the swings on both sides do not confirm is dropped
+        limit = SUSPECT_SLOW
+        size = np.maximum(size, np.abs(np.diff(best.residual, prepend=best.residual[0])) / 2**0.5)
     near = 1.4826 * median_filter(size, size=min(SCALE_SAMPLES, size.size), mode="nearest")
     scale = np.maximum(near, max(broad_scale(size), 1e-9))
     highest = maximum_filter1d(
         size, 2 * best.neighbours + 1, mode="nearest"
     )  # of windows in common
-    which = (size > SUSPECT * scale + 2 * work.count) & (size >= highest)
+    which = (size > limit * scale + 2 * seen.count) & (size >= highest)
     return best.middle[which], scale[which]
 
 
@@ -195,15 +240,37 @@ def _least_absolute(columns: Floats, y: Floats) -> Floats:
 
 def slips(work: Work) -> Finding | None:
     """Correct the clock for jumps that are its slips."""
-    if not work.jumps or work.clock_stderr:
+    if not work.jumps:
         return None
-    clock = slips_of(work.time, work.bridged)
+    clock = None if work.clock_stderr else slips_of(work.time, work.bridged)
     if clock is None:
-        return None
+        return _slips_of_jumps(work)
     number, size, error = counted(clock.places.size, "slip"), 1e3 * clock.slip, 1e3 * clock.stderr
     finding = work.finding("time-slips", at=clock.places, slips=number, size=size, error=error)
     work.time = clock.time
     work.jumps = [j for j in work.jumps if np.min(np.abs(clock.places - j.at)) > SIDE]
+    return finding
+
+
+def _slips_of_jumps(work: Work) -> Finding | None:
+    """Move the times after each jump that is a slip of the clock."""
+    late = [jump for jump in work.jumps if jump.slip]
+    if not late:
+        return None
+    work.jumps = [jump for jump in work.jumps if not jump.slip]
+    sizes = ", ".join(f"{1e3 * jump.slip:+.3g}" for jump in late[:4])
+    at = np.array([jump.at for jump in late])
+    finding = work.finding("time-slips.each", at=at, slips=counted(at.size, "slip"), sizes=sizes)
+    for jump in late:
+        work.time[jump.at :] += jump.slip
+    # A frame that comes twice has the time of the one before.
+    early = np.minimum.accumulate(work.time[::-1])[::-1]
+    again = np.append(np.diff(early) < OFF_FRAME * np.median(np.diff(work.time)), False)
+    if again.any():
+        before = np.cumsum(again)
+        work.jumps = [dataclasses.replace(j, at=j.at - int(before[j.at - 1])) for j in work.jumps]
+        work.bridged = work.bridged[~again]
+        work.keep(~again)
     return finding
 
 
@@ -227,6 +294,12 @@ def jumps(work: Work) -> Finding | None:
             work.theta[at:] -= steps * step
         by = ", ".join(f"{count:+d}" for count in counts[:4])
         return work.finding(key, at=places, jumps=number, counts=by)
+    noise = normal_scale(local_fit(work.time, work.bridged).residual)
+    if all(jump.certain and jump.error < max(noise, OFF_COUNT * work.count) for jump in work.jumps):
+        for jump in work.jumps:
+            work.theta[jump.at :] -= jump.size
+        errors = [f"{j.size:+.3g} +- {j.error:.1g}" for j in work.jumps[:4]]
+        return work.finding("missed-counts.sized", at=places, jumps=number, sizes=", ".join(errors))
     low, high = longest_between([0, *places.tolist()], work.time.size)
     work.trusted[:low] = work.trusted[high:] = False
     other = ", or another recording begins" if max(map(abs, sizes)) > OTHER_RECORD else ""

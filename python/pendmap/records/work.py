@@ -29,11 +29,13 @@ _FEWEST_PEAKS = 3  # Fewest samples of a record of turning points
 
 @dataclasses.dataclass(frozen=True)
 class Jump:
-    """Change of the zero by ``size`` +- ``error`` rad before sample ``at``."""
+    """Change of the zero by ``size`` +- ``error`` rad before sample ``at``, or a slip of time."""
 
     at: int
     size: float
     error: float
+    slip: float = 0.0  # s; the reading does not change then
+    certain: bool = False  # the swing after it differs from that before by no more than this
 
 
 @dataclasses.dataclass

@@ -43,11 +43,12 @@ def test_a_pause_longer_than_all_the_rest_cuts_the_record(tmp_path: Path, *, lat
 
 
 def test_jitter_is_measured_also_where_stamps_hide_it(tmp_path: Path) -> None:
-    time, theta = clean()
+    time, _ = clean()
     off = np.random.default_rng(2).normal(0, 5e-4, time.size)
-    said = found(read(tmp_path, text((time + off, theta))))["time-jitter"].text
-    assert float(said.split("by ")[1].split()[0]) == pytest.approx(5e-4 * 2**0.5, rel=0.1)
     fine, angle, _ = motion(rate=2000.0)
+    true = text((time + off, np.interp(time + off, fine, angle)))
+    said = found(read(tmp_path, true))["time-jitter"].text
+    assert float(said.split("by ")[1].split()[0]) == pytest.approx(5e-4 * 2**0.5, rel=0.1)
     hidden = read(tmp_path, text((time, np.interp(time + 2 * off, fine, angle))))
     said = found(hidden)["noise-grows-with-speed"].text
     assert float(said.split("stamps by ")[1].split()[0]) == pytest.approx(1.0, rel=0.1)  # ms
@@ -177,16 +178,28 @@ def test_the_frequency_is_within_its_errors(tick: float, lost: int) -> None:
     assert abs(best["w0"] - 6.2) < 4 * error
 
 
-def test_stamps_that_scatter_or_are_exact_are_no_ticks() -> None:
+SCATTER = {
+    "longer ticks": lambda time, _: np.floor(time / 0.0312) * 0.0312,
+    "shorter ticks": lambda time, _: np.floor(time / 0.015625) * 0.015625,
+    "noise": lambda time, rng: time + rng.normal(0, 2e-3, time.size),
+}
+
+
+@pytest.mark.parametrize(
+    ("kind", "lost"), [(kind, n) for kind in SCATTER for n in (0, 4) if kind[0] != "l" or not n]
+)
+def test_readings_follow_even_times_or_their_stamps(kind: str, lost: int) -> None:
     rng = np.random.default_rng(1)
-    time = 0.02 * np.arange(1500)
-    theta = decay().angle(time) + rng.normal(0, 2e-3, time.size)
-    for late in (0.0, 2e-3):
-        stamps = time + late * rng.uniform(-1, 1, time.size)
+    time = np.delete(0.02 * np.arange(1500), np.arange(200, 200 + 250 * lost, 250))
+    stamps = np.sort(SCATTER[kind](time, rng) + rng.uniform(0, 4e-4, time.size))
+    for instants, even in ((time, True), (stamps, False)):
+        theta = decay().angle(instants) + rng.normal(0, 2e-3, time.size)
         frame = pd.DataFrame({"t_s": stamps, "theta_rad": theta})
         run = pendmap.read_experiment(frame).runs[0]
-        assert run.clock_stderr == 0
-        assert np.array_equal(run.time, stamps)
+        assert (run.clock_stderr > 0) == even
+        assert even or np.array_equal(run.time, stamps)
+        off = run.time - instants
+        assert np.std(off) < 2e-4
 
 
 DECAY = decay(w0=6.2, c_over_m=0.05, tr=0.06, release=1.6, until=50.0)
