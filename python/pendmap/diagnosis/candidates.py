@@ -29,6 +29,9 @@ ZERO: Final = "encoder_offset"
 CORE: Final = (DRAG, ZERO)
 """Effects of the physical core in addition to viscous damping and Coulomb friction."""
 
+READINGS: Final = (ZERO, "encoder_gain", "timebase")
+"""Zero, scale and clock of a sensor: what stands for them on a record is no effect of its own."""
+
 COMMON: Final = (*CORE, "encoder_gain", "bias_torque")
 """Effects of nearly every rig, the commonest first; all others follow in the library's order."""
 
@@ -200,11 +203,13 @@ def list_candidates(
     driven: bool,
     without: Collection[str] = (),
     user_formulas: Collection[Formula] = (),
+    reach: float = math.inf,
 ) -> list[list[Candidate]]:
     """Return the candidates by effect, each in all its shapes.
 
     Effects equivalent to those in ``taken`` (names of effects and of a Rig's fitted parameters) and
-    those in ``without`` are left out. Effects of the drive need a harmonic drive.
+    those in ``without`` are left out. Effects of the drive need a harmonic drive, and a wave over
+    the angle one wavelength within the range of angles ``reach``, rad: else it is a spring.
     """
     formulas = {formula.name: formula for formula in user_formulas}
     candidates = []
@@ -214,7 +219,10 @@ def list_candidates(
             continue
         if entry.group == "drive" and not driven:
             continue
-        candidates.append([Candidate(name, shape, formulas.get(name)) for shape in _shapes(entry)])
+        waves = {e.name for e in entry.parameters if e.role == "order"}
+        shapes = [s for s in _shapes(entry) if all(math.tau <= s[n] * reach for n in waves)]
+        if shapes:
+            candidates.append([Candidate(name, shape, formulas.get(name)) for shape in shapes])
     return candidates
 
 

@@ -140,6 +140,8 @@ class Run:
         SHA-256 of the file.
     clock_stderr : float
         Relative standard error of the sampling interval, by coarse time stamps; 0 if they are fine.
+    zero_rad : float
+        Angle subtracted from the readings, rad: their zero.
     """
 
     name: str
@@ -165,6 +167,7 @@ class Run:
     count_rad: float = 0.0
     sha256: str = ""
     clock_stderr: float = 0.0
+    zero_rad: float = 0.0
 
     @property
     def moves(self) -> bool:
