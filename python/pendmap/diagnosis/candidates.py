@@ -29,8 +29,7 @@ ZERO: Final = "encoder_offset"
 CORE: Final = (DRAG, ZERO)
 """Effects of the physical core in addition to viscous damping and Coulomb friction."""
 
-READINGS: Final = (ZERO, "encoder_gain", "timebase")
-"""Zero, scale and clock of a sensor: what stands for them on a record is no effect of its own."""
+READINGS: Final = (ZERO, "encoder_gain", "timebase")  # Zero, scale and clock of a sensor
 
 COMMON: Final = (*CORE, "encoder_gain", "bias_torque")
 """Effects of nearly every rig, the commonest first; all others follow in the library's order."""

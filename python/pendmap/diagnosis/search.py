@@ -106,7 +106,8 @@ def _step(state: State, best: FittedModel, starts: Sequence[FittedModel]) -> Fit
         plain = disguises(state, reduced, full) if attempt.accepted else None
         if plain is not None:
             attempt = dataclasses.replace(attempt, accepted=False)
-            refits += [(fit, reduced, plain) for fit in [state.refit(reduced, plain)] if fit]
+            simpler = state.refit(reduced, plain) if plain else None
+            refits += [] if simpler is None else [(simpler, reduced, plain)]
         state.attempts.append(attempt)
         if attempt.accepted:
             return full

@@ -27,10 +27,9 @@ Verdict = Literal["none", "named", "partial", "ambiguous", "unknown"]
 
 SEVERAL: Final = 1.0  # Standard errors subtracted from the largest excess of several runs
 
-WHOLE: Final = 0.99
-"""Share of the squared gap that effects close whole, if no more than ``SLIGHT`` remains."""
+WHOLE: Final = 0.99  # Share of the squared gap from which it is closed, if all is within SLIGHT
 
-SLIGHT: Final = 1.05  # Residual over the noise up to which no effect is missing for any use
+SLIGHT: Final = 1.05  # Residual over the noise up to which nothing of use is missing
 
 THIRDS: Final = 3  # Number of parts of a single run; a name must be better without any one
 

@@ -2,10 +2,6 @@
 
 Consecutive readings are duplicates if they equal those of another run up to an offset, within their
 resolution. Two recordings of one motion, in contrast, differ by their noise.
-
-The runs have one zero if none then swings farther off it than what is left to a fit; else each run
-has its own. The rigs differ if the periods at equal amplitudes are in two groups, ten times their
-spread apart.
 """
 
 from __future__ import annotations
