@@ -29,8 +29,6 @@ ZERO: Final = "encoder_offset"
 CORE: Final = (DRAG, ZERO)
 """Effects of the physical core in addition to viscous damping and Coulomb friction."""
 
-READINGS: Final = (ZERO, "encoder_gain", "timebase")  # Zero, scale and clock of a sensor
-
 COMMON: Final = (*CORE, "encoder_gain", "bias_torque")
 """Effects of nearly every rig, the commonest first; all others follow in the library's order."""
 
@@ -121,6 +119,12 @@ class Candidate:
     def once(self) -> bool:
         """Whether it acts once, in one part of the records."""
         return self.sought is not None and self.sought.role == "instant"
+
+    @property
+    def plain(self) -> bool:
+        """Whether it is the zero, the scale or the clock of a sensor."""
+        clock = self.definition.group == "drive" and self.definition.family == "reading"
+        return clock or self.name in {ZERO, "encoder_gain"}
 
     @property
     def count(self) -> int:

@@ -20,7 +20,6 @@ import math
 from typing import TYPE_CHECKING, Final
 
 from pendmap.diagnosis.baseline import follows
-from pendmap.diagnosis.candidates import READINGS
 from pendmap.diagnosis.refit import key_of
 from pendmap.diagnosis.state import Attempt
 
@@ -125,7 +124,7 @@ def disguises(state: State, reduced: FittedModel, full: FittedModel) -> list[int
     if moved and any(c.definition.family == "position torque" for c in added):
         return []
     scores = state.scores(reduced)
-    places = [k for k in scores.best() if scores.name(k) in READINGS]
+    places = [k for k in scores.best() if scores.scores[k].candidate.plain]
     places = [k for k in places if scores.scores[k].information > 0]
     plain = state.refit(reduced, places) if added and places else None
     alike = plain is not None and plain.chi2 <= full.chi2 + state.thresholds.alike * full.level

@@ -73,11 +73,10 @@ def test_an_effect_that_stands_for_a_spring_or_for_the_readings_is_seen(
     places: Sequence[int] | None,
 ) -> None:
     names = ["encoder_gain", "magnet", "encoder_offset", "timebase"]
-    scores = SimpleNamespace(
-        best=lambda: range(4),
-        name=lambda k: names[k],
-        scores=[SimpleNamespace(information=float(name != "timebase")) for name in names],
-    )
+    listed = [
+        SimpleNamespace(candidate=Candidate(n), information=float(n[0] != "t")) for n in names
+    ]
+    scores = SimpleNamespace(best=lambda: range(4), scores=listed)
     state: Any = SimpleNamespace(
         scores=lambda _: scores,
         refit=lambda _, at: model(6.0, readings if len(at) == 2 else 0.0),
