@@ -121,6 +121,12 @@ class Candidate:
         return self.sought is not None and self.sought.role == "instant"
 
     @property
+    def plain(self) -> bool:
+        """Whether it is the zero, the scale or the clock of a sensor."""
+        clock = self.definition.group == "drive" and self.definition.family == "reading"
+        return clock or self.name in {ZERO, "encoder_gain"}
+
+    @property
     def count(self) -> int:
         """Number of parameters that are fitted or scanned."""
         return len(self.free) + len(self.shape)
@@ -200,11 +206,13 @@ def list_candidates(
     driven: bool,
     without: Collection[str] = (),
     user_formulas: Collection[Formula] = (),
+    reach: float = math.inf,
 ) -> list[list[Candidate]]:
     """Return the candidates by effect, each in all its shapes.
 
     Effects equivalent to those in ``taken`` (names of effects and of a Rig's fitted parameters) and
-    those in ``without`` are left out. Effects of the drive need a harmonic drive.
+    those in ``without`` are left out. Effects of the drive need a harmonic drive, and a wave over
+    the angle one wavelength within the range of angles ``reach``, rad: else it is a spring.
     """
     formulas = {formula.name: formula for formula in user_formulas}
     candidates = []
@@ -214,7 +222,10 @@ def list_candidates(
             continue
         if entry.group == "drive" and not driven:
             continue
-        candidates.append([Candidate(name, shape, formulas.get(name)) for shape in _shapes(entry)])
+        waves = {e.name for e in entry.parameters if e.role == "order"}
+        shapes = [s for s in _shapes(entry) if all(math.tau <= s[n] * reach for n in waves)]
+        if shapes:
+            candidates.append([Candidate(name, shape, formulas.get(name)) for shape in shapes])
     return candidates
 
 

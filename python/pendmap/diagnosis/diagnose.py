@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import math
 from typing import TYPE_CHECKING, Any
 
 from pendmap.analysis.run import in_rounds
@@ -23,6 +24,7 @@ from pendmap.errors import FitDiverged, InputError, check_whole
 from pendmap.identification.experiment import provenance
 from pendmap.identification.fit import refuse_astray
 from pendmap.records import experiment_of
+from pendmap.records.across import with_lab_times, without_hands
 from pendmap.records.summary import UNIT_FINDINGS, doubt_keys
 from pendmap.residuals.by_run import parameters_by_run
 from pendmap.residuals.torque import Torque, outstanding_bins, residual_torque
@@ -104,7 +106,7 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
     >>> found.verdict, [effect.name for effect in found.effects]
     ('named', ['quadratic_drag'])
     """
-    experiment = experiment_of(records, theta, **by_hand)
+    experiment = with_lab_times(experiment_of(records, theta, **by_hand))
     formulas = checked_own(effects)
     check_whole("max_effects", max_effects, 0, 6)
     moved = in_rounds(progress, _FITS) or (lambda _done, _total: None)
@@ -114,10 +116,17 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
     # Windows are as long as those over which the baseline followed the runs.
     data = dataclasses.replace(data, fitted=base.runs)
     moved(1, 1)
-    state = State(data, base, thresholds or Thresholds(), max_effects, without, formulas=formulas)
+    most = 0 if "rigs-differ" in doubt_keys(experiment) else max_effects
+    state = State(data, base, thresholds or Thresholds(), most, without, formulas=formulas)
     state.moved = lambda: moved(1, 1)
     with _refuse_divergence(experiment):
         last = search(state, core)
+    instants = [last.fit[name] for c in last.chosen if c.once for name in c.adapted]
+    shorter = without_hands(experiment, instants, math.tau / last.fit["w0"])
+    if shorter is not None:
+        same: dict[str, Any] = {"effects": effects, "thresholds": thresholds, "progress": progress}
+        return diagnose(shorter, model=model, max_effects=most, without=without, **same)
+    with _refuse_divergence(experiment):
         begin = state.scored(state.begun)
         if not doubt_keys(experiment, *data.runs) & UNIT_FINDINGS:
             refuse_astray(experiment.path, data.fitted, last.fit)

@@ -44,8 +44,6 @@ SIZED_STEPS: Final = 5  # Most steps of the fit of a size before its shape is fi
 NEAR_STEPS: Final = 6  # Most steps of a fit after an exponent was moved
 
 
-ERRORS: Final = 3.0  # Standard errors by which an estimate may exceed a physical limit
-
 STRETCH: Final = 2.0  # Factor by which a width may leave its typical range
 
 
@@ -294,7 +292,6 @@ def _possible(data: DataSplit, fitted: FittedModel, candidate: Candidate) -> boo
     size = estimates.get(candidate.free[0])
     if size is None:
         return True
-    error = ERRORS * math.sqrt(fitted.level) * (size.stderr or 0.0)
     end = max(run.lab_time_s + float(run.time[-1]) for run in data.fitted)
     span = end - min(run.lab_time_s + float(run.time[0]) for run in data.fitted)
     entries = {entry.name: entry for entry in candidate.definition.parameters}
@@ -314,12 +311,10 @@ def _possible(data: DataSplit, fitted: FittedModel, candidate: Candidate) -> boo
             low, high = low / STRETCH * unit, high * STRETCH * unit
         if not low <= estimate.value <= high:
             return False
-    return _drains(fitted, candidate, entries[candidate.size], error, end)
+    return _drains(fitted, candidate, entries[candidate.size], end)
 
 
-def _drains(
-    fitted: FittedModel, candidate: Candidate, entry: EffectParameter, error: float, end: float
-) -> bool:
+def _drains(fitted: FittedModel, candidate: Candidate, entry: EffectParameter, end: float) -> bool:
     """Return whether damping or friction stays positive with a drift or an asymmetry of it."""
     if candidate.definition.group != "damping" or entry.typical[0] >= 0:
         return True
@@ -327,13 +322,8 @@ def _drains(
     # The unit of a rate has one more power of w0 than that of the drifting coefficient.
     power = entry.power_of_w0 - drifts
     base = "Tr" if power == 2 else "c_over_m"  # noqa: PLR2004 (a torque)
-    size, known = fitted.fit[candidate.free[0]], fitted.fit.estimates.get(base)
-    limit = 0.0
-    if known is not None:
-        limit = known.value + ERRORS * math.sqrt(fitted.level) * (known.stderr or 0.0)
-    if drifts:
-        return size * end + error * end + limit >= 0
-    return abs(size) <= limit + error
+    size, limit = fitted.fit[candidate.free[0]], fitted.start.get(base, 0.0)
+    return size * end + limit >= 0 if drifts else abs(size) <= limit
 
 
 def model_errors(data: DataSplit, fitted: FittedModel) -> tuple[float, ...]:

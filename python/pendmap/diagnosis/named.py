@@ -45,12 +45,17 @@ class NamedEffect:
         return self.effect.definition
 
     @property
+    def reserve(self) -> str:
+        """Text after its probability, wherever that is printed; empty for a sure name."""
+        return ", with reserve: the missing effect may only resemble it" if self.approximate else ""
+
+    @property
     def reaches_0(self) -> bool:
         """Whether the interval of its size contains 0, or values below where it opposes."""
         size = next(
             parameter.name for parameter in self.definition.parameters if parameter.role == "size"
         )
-        low, high = self.ci95.get(size, (math.nan, math.nan))
+        low, high = self.ci95.get(size, (-math.inf, math.inf))
         return low <= 0 <= high or (self.definition.opposing == size and low <= 0)
 
     @property
@@ -80,6 +85,7 @@ def name_effects(
         if c.sought
     }
     others = find_equivalents(data, best.fitted, sought)
+    untimed = any(one.what == "lab-time-missing" for one in data.experiment.findings)
     named = []
     for effect, sure in zip(assessment.identified, assessment.probabilities, strict=True):
         candidate = effect.candidate
@@ -95,13 +101,17 @@ def name_effects(
                 ci95[n] = interval(parameters[n], half, mixed=f"{candidate.name}.{n}" in mixed)
             if not between:
                 ci95 |= {k: v for k, v in profiled.get(candidate.name, {}).items() if k == n}
+        probability = effect.share * sure
         named.append(
             NamedEffect(
                 candidate.name,
                 parameters,
                 ci95,
-                effect.share * sure,
-                assessment.approximate or bool(doubt_keys(data.experiment, *data.runs)),
+                probability,
+                assessment.verdict == "partial"
+                or round(probability, 3) < assessment.thresholds.sure
+                or (untimed and "laboratory" in candidate.definition.formula)
+                or bool(doubt_keys(data.experiment, *data.runs)),
                 effect.closed,
                 candidate.formula,
                 others.get(candidate.name, {}),

@@ -163,13 +163,15 @@ def add_effects(
 def try_mirrored_places(data: DataSplit, fitted: FittedModel) -> FittedModel:
     """Return the best of a fit and of fits with places mirrored about the rest position.
 
-    A swinging pendulum passes ``th0`` and ``-th0`` alike; no fit moves from one to the other.
+    A swinging pendulum passes ``th0`` and ``-th0`` alike, and a knock of the other sign half a
+    swing later does nearly the same; no fit moves from one to the other.
     """
     for candidate in fitted.chosen:
-        for start in _mirrored(fitted, candidate):
-            other = _fit_from(data, fitted, candidate, start, MIRROR_STEPS)
+        starts = _mirrored(fitted, candidate)
+        while starts:
+            other = _fit_from(data, fitted, candidate, starts.pop(), MIRROR_STEPS)
             if other is not None and other.chi2 < fitted.chi2:
-                fitted = other
+                fitted, starts = other, _mirrored(other, candidate) if candidate.once else starts
     return fitted
 
 
@@ -206,9 +208,14 @@ def find_equivalents(
 
 
 def _mirrored(fitted: FittedModel, candidate: Candidate) -> list[dict[str, float]]:
-    """Return an effect's places mirrored about the rest position, one at a time."""
+    """Return an effect's places mirrored about the rest position, or instants half a swing off."""
     keys = [f"{candidate.name}.{place}" for place in candidate.places]
-    return [{key: -fitted.fit.estimates[key].value} for key in keys]
+    starts = [{key: -fitted.fit.estimates[key].value} for key in keys]
+    if candidate.once:
+        (size, *_), (key,) = candidate.free, candidate.adapted
+        half = math.pi / fitted.fit["w0"]
+        starts += [{size: -fitted.fit[size], key: fitted.fit[key] + x} for x in (half, -half)]
+    return starts
 
 
 def _fit_from(

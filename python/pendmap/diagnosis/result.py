@@ -309,13 +309,10 @@ def as_text(result: Discrepancy) -> Iterator[str]:
             + (" [{:.4g}, {:.4g}]".format(*effect.ci95[name]) if name in effect.ci95 else "")
             for name, value in effect.parameters.items()
         )
-        nearly = (
-            ", with reserve: the missing effect may only resemble it" if effect.approximate else ""
-        )
         yield (
             f"  {effect.name}: {values}; closes {100 * effect.closes:.0f} % of the squared gap "
             f"that the others leave; probability {effect.probability:.3f}, given that the effect "
-            f"is in the library{nearly}"
+            f"is in the library{effect.reserve}"
         )
         for name, value in effect.elsewhere.items():
             text = f"{name} = {value:.4g} {units[name]}".rstrip()

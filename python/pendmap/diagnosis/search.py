@@ -14,9 +14,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from pendmap.diagnosis.baseline import follows
 from pendmap.diagnosis.refit import key_of
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
     from pendmap.diagnosis.fitted_model import FittedModel
     from pendmap.diagnosis.refit import Key
     from pendmap.diagnosis.state import State
+
+MOVED: Final = 0.03  # Relative change of w0 by a torque of the angle that is a spring in disguise
 
 
 def search(state: State, core: FittedModel | None) -> FittedModel:
@@ -95,13 +98,37 @@ def _step(state: State, best: FittedModel, starts: Sequence[FittedModel]) -> Fit
         return None
     level = min((full for full, _, _ in refits), key=lambda t: t.chi2).level
     refits.sort(key=lambda entry: state.cost(entry[0], level))
-    for fit, reduced, places in refits[:most]:
+    del refits[most:]
+    for fit, reduced, places in refits:
         full = state.converge(fit)
         attempt = _attempt(state, best, reduced, full, places)
+        plain = disguises(state, reduced, full) if attempt.accepted else None
+        if plain is not None:
+            attempt = dataclasses.replace(attempt, accepted=False)
+            simpler = state.refit(reduced, plain) if plain else None
+            refits += [] if simpler is None else [(simpler, reduced, plain)]
         state.attempts.append(attempt)
         if attempt.accepted:
             return full
     return None
+
+
+def disguises(state: State, reduced: FittedModel, full: FittedModel) -> list[int] | None:
+    """Return the places of the readings' effects if further effects only stand for them.
+
+    Effects with a shape or a phase do if scale, zero and clock of the readings together do as
+    much. A torque of the angle that moves w0 stands for a spring: then the places are empty.
+    """
+    added = [c for c in full.chosen if c.name not in reduced.names and c.count > 1]
+    moved = abs(full.fit["w0"] / reduced.fit["w0"] - 1) > MOVED
+    if moved and any(c.definition.family == "position torque" for c in added):
+        return []
+    scores = state.scores(reduced)
+    places = [k for k in scores.best() if scores.scores[k].candidate.plain]
+    places = [k for k in places if scores.scores[k].information > 0]
+    plain = state.refit(reduced, places) if added and places else None
+    alike = plain is not None and plain.chi2 <= full.chi2 + state.thresholds.alike * full.level
+    return places if alike else None
 
 
 def _promising(state: State, fitted: FittedModel) -> tuple[list[list[int]], list[list[int]]]:
@@ -176,6 +203,7 @@ def _preferred(state: State, best: FittedModel) -> FittedModel | None:
                 and state.cost(other) < state.cost(best)
                 and state.closes_enough(best, other)
                 and state.is_significant(reduced, other)
+                and disguises(state, reduced, other) is None
                 and state.keeps_hold_out(best, other)
             ):
                 return other

@@ -171,7 +171,11 @@ class State:
     def _candidates(self, fitted: FittedModel) -> list[list[Candidate]]:
         """Return the candidates that a model does not have, each in all its shapes."""
         return list_candidates(
-            fitted.taken, driven=self.data.forced, without=self.left_out, user_formulas=self.own
+            fitted.taken,
+            driven=self.data.forced,
+            without=self.left_out,
+            user_formulas=self.own,
+            reach=max(float(np.ptp(run.angle[run.counted])) for run in self.data.fitted),
         )
 
     def refit(self, fitted: FittedModel, places: Sequence[int]) -> FittedModel | None:

@@ -27,6 +27,10 @@ Verdict = Literal["none", "named", "partial", "ambiguous", "unknown"]
 
 SEVERAL: Final = 1.0  # Standard errors subtracted from the largest excess of several runs
 
+WHOLE: Final = 0.99  # Share of the squared gap from which it is closed, if all is within SLIGHT
+
+SLIGHT: Final = 1.05  # Residual over the noise up to which nothing of use is missing
+
 THIRDS: Final = 3  # Number of parts of a single run; a name must be better without any one
 
 COEFFICIENTS: Final = (1.94, 0.13, -1.65, 0.74, 0.8)
@@ -196,7 +200,6 @@ class Assessment:
     uneven: float  # Difference of parameters between runs, over its standard error (Cochran's Q)
     form: GoodnessOfFit
     probabilities: tuple[float, ...]  # That each name, or one of its class, is right
-    approximate: bool  # Whether names are given with reserve: the fit is poor, or one is uncertain
     thresholds: Thresholds  # Thresholds of all decisions
 
 
@@ -227,8 +230,9 @@ def decide_verdict(state: State, best: ScoredModel, runs: RunByRun, chance: floa
     }
     form = assess_fit(state.scores(fitted), noise.chance_of, others)
     chance_left = form.chance if ratio <= allowed else 0.0
-    lacks = chance_left < limits.rest
     closed = state.closed(state.base, fitted)
+    slight = closed >= WHOLE and fitted.fit.rms <= SLIGHT * state.noise
+    lacks = chance_left < limits.rest and not slight
     identified = tuple(
         sorted(
             (compare_alternatives(state, fitted, candidate) for candidate in fitted.chosen),
@@ -256,7 +260,6 @@ def decide_verdict(state: State, best: ScoredModel, runs: RunByRun, chance: floa
         runs.uneven,
         form,
         sure,
-        verdict == "partial" or min(sure, default=1.0) < limits.sure,
         limits,
     )
 

@@ -1,4 +1,4 @@
-"""Checks across the runs of an experiment: duplicated readings and different rigs.
+"""Checks across the runs of an experiment: duplicated readings, zeros, and different rigs.
 
 Consecutive readings are duplicates if they equal those of another run up to an offset, within their
 resolution. Two recordings of one motion, in contrast, differ by their noise.
@@ -8,22 +8,27 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import itertools
 import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.formatting import counted
+from pendmap.formatting import counted, moment
 from pendmap.records.experiment import finding_of
-from pendmap.records.scale import small_period
+from pendmap.records.scale import FAR_ZERO, middle_of, swings_of
+from pendmap.signal.robust import normal_scale
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from pendmap.records.experiment import Finding, Run
+    from pendmap.records.experiment import Experiment, Finding, Run
     from pendmap.signal import Floats
 
-ONE_RIG: Final = 0.05  # Relative difference of small-swing periods above which rigs differ
+SPREADS: Final = 10.0  # Gap of two groups of periods, in their spreads, above which rigs differ
+ONE_RIG: Final = 0.05  # Relative difference of periods above which rigs differ at any spread
+CONTACT: Final = 0.25  # Time for which a hand acts beside its instant, in swings
+SURE_PERIOD: Final = 1e-3  # Least relative error of a run's periods
 FEWEST_SHARED: Final = 50  # Fewest readings of a duplicate, and of a run without its duplicates
 LEAST_SHARE: Final = 0.1  # Least share of the shorter run in a duplicate
 LEAST_LEVELS: Final = 20  # Least span of a duplicate, sensor steps: smaller ones agree by chance
@@ -34,20 +39,101 @@ OFF_STEP: Final = 1e-2  # Tolerance, in steps, for differences that are multiple
 
 def checked_together(runs: Sequence[Run]) -> tuple[tuple[Run, ...], tuple[Finding, ...]]:
     """Return runs without duplicated readings, and the findings across runs."""
-    made = without_duplicates(runs)
-    findings: list[Finding] = []
-    swings = {
-        run.name: small_period(run.time[run.trusted], run.theta[run.trusted], run.count_rad)
-        for run in made
-        if run.kind == "free" and not run.peaks_only and run.moves
-    }
-    known = sorted((period, name) for name, period in swings.items() if math.isfinite(period))
-    if known and known[-1][0] > (1 + ONE_RIG) * known[0][0]:
-        short, long = (f"{period:.4g} s in {name}" for period, name in (known[0], known[-1]))
+    made, findings = one_zero(without_duplicates(runs))
+    if (differ := two_groups(made)) is not None:
+        short, long = (f"{period:.4g} s in {name}" for name, period in differ)
         findings.append(finding_of("rigs-differ", short=short, long=long))
     if runs and all(run.hold_out for run in runs):
         findings.append(finding_of("all-held-out"))
     return tuple(made), tuple(findings)
+
+
+def _free(runs: Sequence[Run]) -> list[Run]:
+    """Return the free decays whose samples are read."""
+    return [run for run in runs if run.kind == "free" and run.moves and not run.peaks_only]
+
+
+def two_groups(runs: Sequence[Run]) -> list[tuple[str, float]] | None:
+    """Return the runs of shortest and longest period, s, if they are in two groups or far apart.
+
+    Those of equal amplitudes are compared, since magnets and friction change them, too.
+    """
+    swings = {run.name: of_run for run in _free(runs) if (of_run := swings_of(run)) is not None}
+    if not swings:
+        return None
+    longest = max(swings.values(), key=lambda swing: swing.period.size)
+    places, spread = {}, SURE_PERIOD
+    for name, swing in swings.items():
+        size, order = longest.amplitude, np.argsort(longest.amplitude)
+        level = np.interp(swing.amplitude, size[order], longest.corrected[order])
+        common = (swing.amplitude >= size.min()) & (swing.amplitude <= size.max())
+        apart = (swing.corrected / level)[common]
+        if apart.size > 2:
+            places[name] = float(np.median(apart))
+            spread = max(spread, normal_scale(apart - places[name]) / math.sqrt(apart.size))
+    names = sorted(places, key=lambda name: places[name])
+    values = np.array([places[name] for name in names])
+    if len(names) < 2:
+        return None
+    cut = int(np.argmax(np.diff(values))) + 1
+    spread = max(spread, float(np.std(values[:cut])), float(np.std(values[cut:])))
+    apart = values[-1] - values[0] > ONE_RIG
+    if values[cut] - values[cut - 1] <= SPREADS * spread and not apart:
+        return None
+    return [(name, swings[name].smallest) for name in (names[0], names[-1])]
+
+
+def one_zero(runs: Sequence[Run]) -> tuple[list[Run], list[Finding]]:
+    """Return runs with one zero, or each with its own, if the reading shifted some of them."""
+    middles = {
+        run.name: run.zero_rad + middle
+        for run in _free(runs)
+        if (middle := middle_of(run.time[run.trusted], run.theta[run.trusted])) is not None
+    }
+    if len({run.zero_rad for run in runs if run.name in middles}) < 2:
+        return list(runs), []
+    low, high = min(middles.values()), max(middles.values())
+    zero, how = (low + high) / 2, "the middle of each subtracted from it"
+    if high - zero < FAR_ZERO:
+        how = f"{zero:.4g} subtracted from all, the rest left to the fit"
+        middles = dict.fromkeys((run.name for run in runs), zero)
+    made = []
+    for run in runs:
+        zero = middles.get(run.name, run.zero_rad)
+        findings = tuple(f for f in run.findings if f.what not in {"zero-offset", "gauge-turned"})
+        theta = run.theta + run.zero_rad - zero
+        made.append(dataclasses.replace(run, theta=theta, zero_rad=zero, findings=findings))
+    return made, [finding_of("zero-offset.runs", low=low, high=high, how=how)]
+
+
+def without_hands(
+    experiment: Experiment, instants: Sequence[float], swing: float
+) -> Experiment | None:
+    """Return an experiment without the ends of runs that a hand moved; None without a hand.
+
+    An instant, s in the laboratory, within a swing (s) of a run's start or end is that of a hand.
+    """
+    cut = {}
+    for t, run in itertools.product(instants, [run for run in experiment.runs if run.moves]):
+        since = run.lab_time_s + run.time - t
+        first, last = np.abs(since[run.trusted][[0, -1]]) < swing
+        hand = first & (since < CONTACT * swing) | last & (since > -CONTACT * swing)
+        hand &= run.trusted
+        if hand.any():
+            at, number = moment(t - run.lab_time_s), counted(int(hand.sum()), "reading")
+            findings = (*run.findings, finding_of("hand-at-end", at=at, number=number))
+            cut[run.name] = dataclasses.replace(run, trusted=run.trusted & ~hand, findings=findings)
+    runs = tuple(cut.get(run.name, run) for run in experiment.runs)
+    return dataclasses.replace(experiment, runs=runs) if cut else None
+
+
+def with_lab_times(experiment: Experiment) -> Experiment:
+    """Return an experiment with a finding if its files do not say when they were recorded."""
+    runs = experiment.runs
+    if len({run.file for run in runs}) < 2 or any(run.lab_time_s for run in runs):
+        return experiment
+    findings = dict.fromkeys((*experiment.findings, finding_of("lab-time-missing")))
+    return dataclasses.replace(experiment, findings=tuple(findings))
 
 
 def without_duplicates(runs: Sequence[Run]) -> list[Run]:

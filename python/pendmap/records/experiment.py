@@ -143,6 +143,8 @@ class Run:
         SHA-256 of the file.
     clock_stderr : float
         Relative standard error of the sampling interval, by coarse time stamps; 0 if they are fine.
+    zero_rad : float
+        Angle subtracted from the readings, rad: their zero.
     """
 
     name: str
@@ -168,6 +170,7 @@ class Run:
     count_rad: float = 0.0
     sha256: str = ""
     clock_stderr: float = 0.0
+    zero_rad: float = 0.0
 
     def __repr__(self) -> str:
         span = f"{self.time[0]:g} to {self.time[-1]:g} s" if self.time.size else "no time"

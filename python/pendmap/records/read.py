@@ -330,4 +330,5 @@ def _run(work: Work, name: str, digest: str) -> Run:
         count_rad=0.0 if work.edges else work.count,
         sha256=digest,
         clock_stderr=work.clock_stderr,
+        zero_rad=work.zero,
     )

@@ -21,7 +21,7 @@ from pendmap.signal.half_cycles import after_turns, swings
 from pendmap.signal.robust import Z95, normal_scale
 
 if TYPE_CHECKING:
-    from pendmap.records.experiment import Finding
+    from pendmap.records.experiment import Finding, Run
     from pendmap.records.work import Work
     from pendmap.signal import Floats, Indices
 
@@ -63,16 +63,20 @@ class Periods:
         return self.small / float(np.median(grown))
 
     @property
+    def corrected(self) -> Floats:
+        """Periods over the growth of a pendulum's with its amplitude, s, shape (M,)."""
+        return self.period / growth(np.minimum(self.amplitude, 3.0))
+
+    @property
     def _smallest(self) -> Indices:
         return np.argsort(self.amplitude)[: max(self.period.size // 3, 1)]
 
 
-def small_period(time: Floats, theta: Floats, count: float) -> float:
-    """Return the period of small swings, s; NaN if there are too few below half a turn."""
-    periods = periods_of(time, theta - (middle_of(time, theta) or 0.0), count)
-    if periods is None or float(np.min(periods.amplitude)) >= math.pi:
-        return math.nan
-    return periods.smallest
+def swings_of(run: Run) -> Periods | None:
+    """Return the periods of a free run; None if too few are below half a turn."""
+    time, theta = run.time[run.trusted], run.theta[run.trusted]
+    periods = periods_of(time, theta - (middle_of(time, theta) or 0.0), run.count_rad)
+    return None if periods is None or float(periods.amplitude.min()) >= math.pi else periods
 
 
 def periods_of(time: Floats, theta: Floats, count: float) -> Periods | None:
@@ -288,10 +292,11 @@ def zero(work: Work) -> Finding | None:
         return work.finding("zero-uncertain")
     if "angle" in work.declared and abs(off) < math.pi / 2 - OFF_QUARTER:
         return work.finding("zero-offset.given", middle=off)
-    if quarters and abs(off - gauge) < OFF_QUARTER:
-        work.theta -= turns + gauge
+    turned = quarters and abs(off - gauge) < OFF_QUARTER
+    work.zero = turns + (gauge if turned else off)
+    work.theta -= work.zero
+    if turned:
         return work.finding("gauge-turned", degrees=90 * quarters, middle=off)
-    work.theta -= turns + off
     return work.finding("zero-offset.subtracted", middle=off)
 
 

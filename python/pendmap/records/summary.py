@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 # Findings of a wrong unit or scale, which makes results wrong unless corrected
 UNIT_FINDINGS: Final = frozenset(("angle-scale", "angle-unit", "pivot-unit", "time-unit"))
 # Findings that are reported before any result
-DOUBTFUL: Final = UNIT_FINDINGS | {"few-used", "motor-column", "rigs-differ"}
+DOUBTFUL: Final = UNIT_FINDINGS | {"few-used", "lab-time-missing", "motor-column", "rigs-differ"}
 
 
 def as_json(experiment: Experiment) -> dict[str, Any]:
@@ -138,9 +138,9 @@ def doubt_lines(experiment: Experiment, *runs: Run) -> Iterator[str]:
 
 
 def doubt_keys(experiment: Experiment, *runs: Run) -> set[str]:
-    """Return the keys of uncorrected doubtful findings, without the scale of the angle."""
+    """Return the keys of uncorrected doubtful findings, without those of single effects."""
     keys = {finding.what for _, finding in experiment.findings_of(runs) if _doubted(finding)}
-    return keys - {"angle-scale"}  # an effect can cause it, too
+    return keys - {"angle-scale", "lab-time-missing"}  # a gain or a drift, for example
 
 
 def finding_lines(experiment: Experiment, *runs: Run, changes: bool = False) -> Iterator[str]:

@@ -75,6 +75,7 @@ class Work:
     period: float = math.nan  # period of small swings, s
     noise: float = 0.0  # standard deviation of a reading, rad
     clock_stderr: float = 0.0  # relative standard error of the sampling interval
+    zero: float = 0.0  # angle subtracted from the readings, rad
     limit: float = 0.0  # range of readings below which there is no motion, rad
 
     @property

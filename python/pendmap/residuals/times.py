@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats
 
 
-KEPT: Final = 4  # Number of frequencies or instants returned; fewest readings of a window
+KEPT: Final = 4  # Number of frequencies returned; fewest readings of a window
+PARTS: Final = 10  # Number of parts of the records in which one instant each is returned
 FINE: Final = 4  # Oversampling of the frequency grid, relative to one over the records' duration
 MOST: Final = 1 << 18  # Most frequencies tried
 GROWTH: Final = 30.0
@@ -111,15 +112,15 @@ def calm_responses(
 
 
 def instants(responses: Sequence[Response]) -> list[float]:
-    """Return the laboratory times, s, of the impulses with the greatest gains."""
+    """Return the laboratory time, s, of the impulse with the greatest gain in each tenth."""
     time, gain = [], []
     for response in responses:
         pull, information = response.pull(response.residual), response.information()
         score = np.divide(pull**2, information, out=np.zeros_like(pull), where=information > 0)
-        peaks = (score[1:-1] > score[:-2]) & (score[1:-1] >= score[2:])
-        time.append(response.time[1:-1][peaks])
-        gain.append(score[1:-1][peaks])
-    return _greatest(np.concatenate(time), np.concatenate(gain), 0.0)
+        time.append(response.time)
+        gain.append(score)
+    parts = zip(*(np.array_split(np.concatenate(x), PARTS) for x in (time, gain)), strict=True)
+    return [float(of[np.argmax(score)]) for of, score in parts if score.size]
 
 
 def frequencies(responses: Sequence[Response], most: float) -> list[float]:

@@ -129,7 +129,7 @@ def test_the_printed_model_equals_the_written_one(tmp_path: Path) -> None:
     assert content["provenance"]["set_to_zero"] == ["Tr"]
 
 
-@pytest.mark.parametrize(("part", "possible"), [(2.0, False), (0.5, True)])
+@pytest.mark.parametrize(("part", "possible"), [(2.0, False), (1.05, False), (0.5, True)])
 def test_a_drift_takes_no_friction_below_0(part: float, *, possible: bool) -> None:
     # A record by scipy whose friction decreases by a fraction.
     def rhs(t: float, state: list[float]) -> list[float]:
