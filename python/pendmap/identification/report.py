@@ -10,6 +10,7 @@ import numpy as np
 
 from pendmap.errors import InputError
 from pendmap.formatting import counted, estimate_text, interval, percent
+from pendmap.identification.engineering import QUANTITIES, quantities, swing_amplitude
 from pendmap.identification.methods.trajectory import identification_of
 from pendmap.identification.parameters import OFFSET, SENSOR
 from pendmap.identification.results import FitResult, Followed
@@ -42,6 +43,22 @@ COLUMNS: Final = {
 
 _SHORT: Final = {"w0": ("w0", "rad/s"), "c_over_m": ("c/m", "1/s"), "Tr": ("Tr", "rad/s^2")}
 """Symbols and units of the parameters that are said first."""
+
+
+TRADE: Final = {
+    "frequency_hz": "f = {} Hz",
+    "period_s": "period {} s",
+    "zeta": "viscous: zeta = {}",
+    "log_decrement": "log decrement {}",
+    "time_constant_s": "time constant {} s",
+    "Q": "Q = {} at {:.3g} rad, of all losses",
+    "dead_band_rad": "dead band {} rad",
+    "dead_band_deg": "{} degrees",
+    "friction_n_m": "friction {} N m",
+    "viscous_n_m_s": "viscous {} N m s",
+}
+"""Text of each of the quantities of the trade."""
+TRADE_LINES: Final = ([*TRADE][:2], [*TRADE][2:5], [*TRADE][5:8], [*TRADE][8:])
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -100,6 +117,32 @@ class IdentificationReport(FitResult):
     def parameters(self) -> Mapping[str, Estimate]:
         """Parameters of the best method; none if no method gives a model."""
         return {} if self.sound is None else self.sound.parameters
+
+    @property
+    def largest_swing(self) -> float:
+        """Amplitude of the largest swing of :attr:`run`, rad; pi where it rotates."""
+        size = np.abs(self.peaks.amplitude)
+        if self.joint is not None:
+            size = swing_amplitude(*self.joint.fit.curves[0], self.joint.fit["w0"])
+        return min(float(np.nanmax(size)), np.pi) if np.isfinite(size).any() else np.nan
+
+    @property
+    def quantities(self) -> Mapping[str, Estimate]:
+        """Numbers of the trade with errors, by name; those that are not known are left out.
+
+        Of small swings ``frequency_hz = w0 / (2 pi)`` and ``period_s``. Of the viscous damping
+        alone ``zeta = c / (2 m w0)``, ``log_decrement = 2 pi zeta / sqrt(1 - zeta^2)`` and
+        ``time_constant_s = 2 m / c`` of the amplitude. ``Q = 2 pi E / loss`` of a cycle at half of
+        :attr:`largest_swing`, by damping, friction and quadratic drag together. The dead band in
+        which friction holds the pendulum, ``asin(Tr / w0^2)``, as ``dead_band_rad`` and
+        ``dead_band_deg``. ``friction_n_m = J Tr`` and ``viscous_n_m_s = J c / m`` with the moment
+        of inertia ``J`` about the pivot: ``inertia`` of ``[rig]``, kg m^2, or ``m g l / w0^2`` of
+        its ``mass``, kg, and ``length``, m, from the pivot to the centre of mass.
+        """
+        if self.sound is None:
+            return {}
+        known = self.experiment.known, self.experiment.gravity
+        return quantities(self.sound, self.largest_swing / 2, *known)
 
     @property
     def joint_covariance(self) -> Covariance | None:
@@ -208,7 +251,7 @@ def left_out(experiment: Experiment, read: Sequence[Run]) -> str:
 
 def as_json(report: IdentificationReport) -> dict[str, Any]:
     """Return the JSON object of ``pendmap identify``, without the paths of files."""
-    run, best = report.run, report.sound
+    run, best, known = report.run, report.sound, report.quantities
     return {
         "experiment": str(report.experiment.path),
         "run": run.name,
@@ -216,6 +259,11 @@ def as_json(report: IdentificationReport) -> dict[str, Any]:
         "noise": report.peaks.sigma,
         "best": None if best is None else best.method,
         "doubts": foremost(report),
+        "quantities": {
+            name: None if one is None else dataclasses.asdict(one)
+            for name, one in ((name, known.get(name)) for name in QUANTITIES)
+        },
+        "q_amplitude_rad": report.largest_swing / 2 if "Q" in known else None,
         "methods": {name: _method(result) for name, result in report.methods.items()},
         "table1": [
             {"what": r.what, "asked": r.asked, "measured": r.measured, "errors_percent": r.errors}
@@ -299,6 +347,7 @@ def in_short(report: IdentificationReport) -> Iterator[str]:
             for name in names
             if name in best.parameters
         )
+        yield from trade_lines(report)
         yield f"{best.method}: {best.used}"
     runs_text = left_out(report.experiment, report.runs)
     if runs_text:
@@ -313,6 +362,19 @@ def in_short(report: IdentificationReport) -> Iterator[str]:
             f"residual is {report.with_drag.fit.rms:.3g} rad, {report.joint.fit.rms:.3g} without: "
             f"--effect {DRAG} fits it, diagnose looks for more"
         )
+
+
+def trade_lines(report: IdentificationReport) -> Iterator[str]:
+    """Yield the numbers of the trade: of small swings, of all losses, and torques."""
+    known, half = report.quantities, report.largest_swing / 2
+    texts = {
+        name: text.format(estimate_text(known[name]), half)
+        for name, text in TRADE.items()
+        if name in known
+    }
+    for names in TRADE_LINES:
+        if line := ", ".join(texts[name] for name in names if name in texts):
+            yield line
 
 
 def foremost(report: IdentificationReport) -> list[str]:
