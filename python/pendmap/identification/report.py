@@ -19,6 +19,8 @@ from pendmap.records.summary import doubts, finding_lines
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
+    import pandas as pd
+
     from pendmap.formatting import Estimate
     from pendmap.identification.methods.base import Identification
     from pendmap.identification.methods.trajectory import JointFit
@@ -41,7 +43,7 @@ COLUMNS: Final = {
 }
 """Columns of the table of methods and their headers; effects' parameters follow."""
 
-_SHORT: Final = {"w0": ("w0", "rad/s"), "c_over_m": ("c/m", "1/s"), "Tr": ("Tr", "rad/s^2")}
+SHORT: Final = {"w0": ("w0", "rad/s"), "c_over_m": ("c/m", "1/s"), "Tr": ("Tr", "rad/s^2")}
 """Symbols and units of the parameters that are said first."""
 
 
@@ -117,6 +119,28 @@ class IdentificationReport(FitResult):
     def parameters(self) -> Mapping[str, Estimate]:
         """Parameters of the best method; none if no method gives a model."""
         return {} if self.sound is None else self.sound.parameters
+
+    @property
+    def readings(self) -> pd.DataFrame:
+        """All readings of the fitted runs, one below the other.
+
+        ``time_s`` on the clock of the run, ``reading_rad``, ``fit_rad``, ``residual_rad`` and
+        ``run``; of a sensor on the rod ``reading_rad_per_s`` or so. Fit and residual are nan where
+        a reading is not fitted. InputError is raised without a fit of whole records.
+        """
+        import pandas as pd  # noqa: PLC0415 (where it is needed)
+
+        fit, _, runs = self.followed()
+        parts = []
+        for run, left in zip(runs, fit.residuals, strict=True):
+            gain, unit = 1.0, "rad"
+            if run.rod_sensor is not None:
+                gain, unit = run.rod_sensor.gain, run.rod_sensor.unit.replace("/", "_per_")
+            residual = np.where(run.trusted, gain * left, np.nan)
+            columns = {"reading": run.read, "fit": run.read - residual, "residual": residual}
+            named = {f"{name}_{unit}": values for name, values in columns.items()}
+            parts.append(pd.DataFrame({"time_s": run.time, **named, "run": run.name}))
+        return pd.concat(parts, ignore_index=True)
 
     @property
     def largest_swing(self) -> float:
@@ -340,12 +364,12 @@ def in_short(report: IdentificationReport) -> Iterator[str]:
     best = report.sound
     yield from (f"Warning: {text}" for text in foremost(report))
     if best is not None:
-        names = [*_SHORT, *(n for n in best.estimates if n not in (*COLUMNS, *_SHORT))]
+        names = [*SHORT, *(n for n in best.estimates if n not in (*COLUMNS, *SHORT))]
         yield ", ".join(
-            f"{_SHORT.get(name, (name, ''))[0]} = {estimate_text(best.parameters[name])}"
-            f" {_SHORT.get(name, (name, ''))[1]}".rstrip()
+            f"{symbol} = {estimate_text(best.parameters[name])} {unit}".rstrip()
             for name in names
             if name in best.parameters
+            for symbol, unit in [SHORT.get(name, (name, best.unit(name)))]
         )
         yield from trade_lines(report)
         yield f"{best.method}: {best.used}"
@@ -367,11 +391,12 @@ def in_short(report: IdentificationReport) -> Iterator[str]:
 def trade_lines(report: IdentificationReport) -> Iterator[str]:
     """Yield the numbers of the trade: of small swings, of all losses, and torques."""
     known, half = report.quantities, report.largest_swing / 2
-    texts = {
-        name: text.format(estimate_text(known[name]), half)
-        for name, text in TRADE.items()
-        if name in known
-    }
+    texts = {}
+    for name in TRADE.keys() & known.keys():
+        one, text = known[name], estimate_text(known[name])
+        if one.stderr is None and one.ci95 is not None and one.ci95[0] < one.value:
+            text = f"{text} {interval(one)}"
+        texts[name] = TRADE[name].format(text, half)
     for names in TRADE_LINES:
         if line := ", ".join(texts[name] for name in names if name in texts):
             yield line
