@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
     from pendmap.charts.marks import Ends, Floats
     from pendmap.identification import IdentificationReport, PeakErrors, Peaks
+    from pendmap.identification.fit import TrajectoryFit
     from pendmap.model import Rig
     from pendmap.records import Run
 
@@ -60,7 +61,7 @@ def sheet(report: IdentificationReport) -> Chart:
         read = gain * joint.given[0].theta
         left, sigma = joint.fit.residuals[0], joint.readings[0].sigma
         below = residuals(run, left, sigma, BEST, "residual: record less fit")
-        rows = [[*rows[0], _close(report, read, read - gain * left)], [below, *rows[1]]]
+        rows = [[*rows[0], _close(run, joint.fit, read, read - gain * left)], [below, *rows[1]]]
         ratios = {
             one.name: float(np.sqrt(np.mean(left[one.trusted] ** 2))) / reading.sigma
             for one, left, reading in zip(
@@ -88,10 +89,9 @@ def _record(report: IdentificationReport) -> Panel:
     return Panel("record", "record", clock, up, marks if (~used).any() else marks[1:])
 
 
-def _close(report: IdentificationReport, read: Floats, made: Floats) -> Panel:
+def _close(run: Run, fit: TrajectoryFit, read: Floats, made: Floats) -> Panel:
     """Return the readings of the first swings, and those of the fit as a line."""
-    run, fit, sensor = report.run, report.joint.fit, report.run.rod_sensor
-    theta, velocity = fit.curves[0]
+    sensor, (theta, velocity) = run.rod_sensor, fit.curves[0]
     begin = float(run.time[run.trusted][0])
     ends = (begin, begin + SWINGS * math.tau / fit["w0"])
     near = (run.time >= ends[0]) & (run.time <= ends[1]) & np.isfinite(theta)
@@ -125,7 +125,7 @@ def _envelope_of_fit(report: IdentificationReport) -> Panel:
         marks = []
     reach = [np.zeros(1), size]
     if (joint := report.joint) is not None:
-        swing = swing_amplitude(*joint.fit.curves[0], joint.fit["w0"])
+        swing = swing_amplitude(joint.fit.curves[0], joint.fit["w0"])
         marks.append(dataclasses.replace(_line(run.time, swing, BEST, 1.4), name="fit"))
         reach.append(swing)
     elif best is not None and not report.table.left_out and best.method not in report.table.lost:

@@ -221,10 +221,11 @@ def of_result(
             dataset = legend.with_looks(dataset, colours or {}, names or {})
         return build(dataset, layer=layer, cells=cells)
     module = importlib.import_module(f"pendmap.charts.{name}")
-    made: Chart | Sheet = module.sheet(result)
+    made: Any = module.sheet(result)
     if hasattr(module, "whole") and layer not in {None, *(panel.name for panel in made.panels)}:
         whole: Sheet = module.whole(result)
         if layer == ALL:
             return whole
         made = dataclasses.replace(whole, columns=[[made], *whole.columns])
-    return made.only(layer)
+    shown: Chart | Sheet = made.only(layer)
+    return shown

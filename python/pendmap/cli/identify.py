@@ -48,7 +48,6 @@ def command(
     methods: tuple[str, ...],
     effects: tuple[str, ...],
     rate_hz: float | None,
-    plot_all: bool,
     verbose: bool,
     **given: Any,  # noqa: ANN401
 ) -> None:
@@ -67,6 +66,7 @@ def command(
     from pendmap.model import save_model
     from pendmap.records import files_of, read_experiment
 
+    layer = ALL if given.pop("plot_all") else None
     outputs = Outputs.take(given, "identify", files_of(path), default=("model", "plot", "rerun"))
     experiment = read_experiment(path, rate_hz=rate_hz)
     with outputs.progress("identify") as progress:
@@ -84,5 +84,5 @@ def command(
         finish(Written())
         raise
     save = functools.partial(save_model, model)
-    written = outputs.write(report, save, keep=True, layer=ALL if plot_all else None)
+    written = outputs.write(report, save, keep=True, layer=layer)
     finish(written)

@@ -10,7 +10,6 @@ import numpy as np
 from pendmap.formatting import Estimate
 from pendmap.identification.parameters import PLACES
 from pendmap.identification.uncertainty import jacobian
-from pendmap.model.effects import definition
 from pendmap.signal.robust import Z95
 
 if TYPE_CHECKING:
@@ -36,11 +35,16 @@ QUANTITIES: Final[dict[str, tuple[str, str]]] = {
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(24)
 
 
-def swing_amplitude(theta: Floats, velocity: Floats, w0: float) -> Floats:
-    """Return the amplitude of a swing of the same energy, rad; above pi of a rotation."""
+def swing_amplitude(curve: Floats, w0: float) -> Floats:
+    """Return the amplitude of swings with the energy of angle and velocity, shape (2, n), rad.
+
+    Of a rotation it is above pi.
+    """
+    theta, velocity = curve
     energy = 1 - np.cos(theta) + 0.5 * (velocity / w0) ** 2
     swing = np.arccos(np.clip(1 - energy, -1, 1))
-    return np.where(energy > 2, math.pi * np.sqrt(energy / 2), swing)  # noqa: PLR2004 (upright)
+    above = energy > 2  # noqa: PLR2004 (of the inverted pendulum at rest)
+    return np.asarray(np.where(above, math.pi * np.sqrt(energy / 2), swing), np.float64)
 
 
 def inertia_of(known: Mapping[str, float], gravity: float, w0: float) -> float:
@@ -104,8 +108,8 @@ def _computed(p: Mapping[str, float], amplitude: float, inertia: float) -> Float
     """Return the QUANTITIES of parameters in SI, nan where one is missing.
 
     A swing of amplitude ``A`` has the energy ``E = w0^2 (1 - cos A)`` per moment of inertia and the
-    velocity ``v^2 = 2 w0^2 (cos theta - cos A)``. It loses ``4 int_0^A (c/m v + Tr + q v^2) dtheta``
-    in a cycle, and ``Q = 2 pi E / loss``: ``w0 m / c`` of viscous damping alone at small swings.
+    velocity ``v^2 = 2 w0^2 (cos theta - cos A)``. A cycle loses four times the integral of ``c/m v
+    + Tr + q v^2`` from 0 to A, and ``Q = 2 pi E / loss``: ``w0 m / c`` of viscous damping alone at small swings.
     """
     w0, c = p["w0"], p.get("c_over_m", math.nan)
     friction, drag = p.get("Tr", 0.0), p.get(DRAG, 0.0)

@@ -147,7 +147,7 @@ class IdentificationReport(FitResult):
         """Amplitude of the largest swing of :attr:`run`, rad; pi where it rotates."""
         size = np.abs(self.peaks.amplitude)
         if self.joint is not None:
-            size = swing_amplitude(*self.joint.fit.curves[0], self.joint.fit["w0"])
+            size = swing_amplitude(self.joint.fit.curves[0], self.joint.fit["w0"])
         return min(float(np.nanmax(size)), np.pi) if np.isfinite(size).any() else np.nan
 
     @property

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from scipy.fft import dct
 
+from pendmap.identification.engineering import swing_amplitude
 from pendmap.identification.sensitivity import window_slopes
 
 if TYPE_CHECKING:
@@ -154,13 +155,7 @@ def outstanding_bins(torque: Torque) -> list[dict[str, Any]]:
 def _places(run: FitRun, fit: TrajectoryFit, window: WindowSlopes) -> dict[str, Floats]:
     """Return the quantities of OVER at each sample of a window."""
     part = slice(window.first, window.first + len(window.residual))
-    theta, velocity = (row[part] for row in fit.curves[window.run])
-    energy = 1 - np.cos(theta) + 0.5 * (velocity / fit.model.w0) ** 2
-    amplitude = np.where(
-        energy > 2,  # noqa: PLR2004 (of the inverted pendulum at rest)
-        math.pi * np.sqrt(energy / 2),
-        np.arccos(np.clip(1 - energy, -1, 1)),
-    )
+    theta, velocity = curve = fit.curves[window.run][:, part]
     phase = np.full(theta.shape, math.nan)
     drive = fit.drive_of(run, window.run)
     if drive:
@@ -169,7 +164,7 @@ def _places(run: FitRun, fit: TrajectoryFit, window: WindowSlopes) -> dict[str, 
     return {
         "angle": np.angle(np.exp(1j * theta)),
         "velocity": velocity,
-        "amplitude": amplitude,
+        "amplitude": swing_amplitude(curve, fit.model.w0),
         "drive_phase": phase,
         "lab_time": run.lab_time_s + run.time[part],
     }
