@@ -109,7 +109,8 @@ def _computed(p: Mapping[str, float], amplitude: float, inertia: float) -> Float
 
     A swing of amplitude ``A`` has the energy ``E = w0^2 (1 - cos A)`` per moment of inertia and the
     velocity ``v^2 = 2 w0^2 (cos theta - cos A)``. A cycle loses four times the integral of ``c/m v
-    + Tr + q v^2`` from 0 to A, and ``Q = 2 pi E / loss``: ``w0 m / c`` of viscous damping alone at small swings.
+    + Tr + q v^2`` from 0 to A. ``Q = 2 pi E / loss`` is ``w0 m / c`` of viscous damping alone at
+    small swings.
     """
     w0, c = p["w0"], p.get("c_over_m", math.nan)
     friction, drag = p.get("Tr", 0.0), p.get(DRAG, 0.0)
