@@ -9,9 +9,12 @@ import numpy as np
 import pytest
 
 import pendmap
+from fits import joint_fit
 from pendmap import Effect, Rig, Run
 from pendmap.identification import identify
 from pendmap.records import Experiment
+from pendmap.residuals.noise import estimate_noise
+from pendmap.residuals.torque import OVER, residual_torque
 
 DRAG = (Effect("quadratic_drag", {"q": 0.05}),)
 KNOWN = {"mass": 0.2, "length": 0.3}
@@ -69,3 +72,20 @@ def test_what_is_not_known_is_left_out() -> None:
     # Q is not that of a damping which it leaves out.
     cubic = Rig(w0=5.0, c_over_m=0.05, Tr=0.1, effects=(Effect("cubic_damping", {"k3": 0.01}),))
     assert "Q" not in report(cubic).quantities
+
+
+def test_the_missing_torque_has_nothing_of_the_models_own_terms() -> None:
+    rig = Rig(w0=5.0, c_over_m=0.05, Tr=0.1, effects=DRAG)
+    time = np.arange(0.0, 20.0, 0.02)
+    theta = pendmap.simulate(rig, 2.0, 0.0, t_eval=time).theta.values
+    theta += np.random.default_rng(0).normal(0, 2e-3, time.size)
+    joint = joint_fit(time, theta)
+    noise = estimate_noise(joint.fit, joint.given, len(joint.fit.names), [0.0])
+    rows = residual_torque(joint.given, joint.fit, noise).rows
+    torque = {name: np.array([row["torque"] for row in rows[name]]) for name in OVER if rows[name]}
+    # Coulomb friction is a constant along the motion.
+    assert torque["amplitude"].mean() == pytest.approx(0, abs=1e-9)
+    assert torque["lab_time"].mean() == pytest.approx(0, abs=1e-9)
+    # Over the velocity nothing is left along the friction and the damping.
+    middle = np.array([(row["from"] + row["to"]) / 2 for row in rows["velocity"]])
+    assert abs(torque["velocity"] @ np.sign(middle)) < 0.2 * np.abs(torque["velocity"]).sum()
