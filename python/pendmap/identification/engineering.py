@@ -7,31 +7,32 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.formatting import Estimate
+from pendmap.formatting import Estimate, estimate_text, interval
 from pendmap.identification.parameters import PLACES
 from pendmap.identification.uncertainty import jacobian
 from pendmap.signal.robust import Z95
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
 
     from pendmap.identification.results import Parameters
     from pendmap.signal import Floats
 
 DRAG: Final = "quadratic_drag.q"
-QUANTITIES: Final[dict[str, tuple[str, str]]] = {
-    "frequency_hz": ("Hz", "frequency of small swings"),
-    "period_s": ("s", "period of small swings"),
-    "zeta": ("1", "damping ratio of the viscous damping alone"),
-    "log_decrement": ("1", "logarithmic decrement of a period, of the viscous damping alone"),
-    "time_constant_s": ("s", "time in which viscous damping alone takes an amplitude to 1/e"),
-    "Q": ("1", "quality factor at q_amplitude_rad, of damping, friction and drag"),
-    "dead_band_rad": ("rad", "greatest angle at which friction holds the pendulum"),
-    "dead_band_deg": ("degrees", "the same angle"),
-    "friction_n_m": ("N m", "torque of the Coulomb friction"),
-    "viscous_n_m_s": ("N m s", "torque of the viscous damping over the velocity"),
+QUANTITIES: Final[dict[str, tuple[str, str, str]]] = {
+    "frequency_hz": ("Hz", "f = {} Hz", "frequency of small swings"),
+    "period_s": ("s", "period {} s", "period of small swings"),
+    "zeta": ("1", "viscous: zeta = {}", "damping ratio of the viscous damping alone"),
+    "log_decrement": ("1", "log decrement {}", "logarithmic decrement by viscous damping alone"),
+    "time_constant_s": ("s", "time constant {} s", "1/e time by viscous damping alone"),
+    "Q": ("1", "Q = {} at {:.3g} rad, of all losses", "quality factor at q_amplitude_rad"),
+    "dead_band_rad": ("rad", "dead band {} rad", "angle to which friction holds the pendulum"),
+    "dead_band_deg": ("degrees", "{} degrees", "the same angle"),
+    "friction_n_m": ("N m", "friction {} N m", "torque of the Coulomb friction"),
+    "viscous_n_m_s": ("N m s", "viscous {} N m s", "torque of the viscous damping per velocity"),
 }
-"""Unit and meaning of each quantity."""
+"""Unit, text and meaning of each quantity."""
+LINES: Final = ((0, 2), (2, 5), (5, 8), (8, 10))  # Quantities of each line of text
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(24)
 
 
@@ -135,3 +136,16 @@ def _computed(p: Mapping[str, float], amplitude: float, inertia: float) -> Float
             inertia * c,
         ]
     )
+
+
+def lines_of(known: Mapping[str, Estimate], amplitude: float) -> Iterator[str]:
+    """Yield lines of text with quantities; Q is at an amplitude, rad."""
+    texts = {}
+    for name in QUANTITIES.keys() & known.keys():
+        one, text = known[name], estimate_text(known[name])
+        if one.stderr is None and one.ci95 is not None and one.ci95[0] < one.value:
+            text = f"{text} {interval(one)}"
+        texts[name] = QUANTITIES[name][1].format(text, amplitude)
+    for first, end in LINES:
+        if line := ", ".join(texts[name] for name in [*QUANTITIES][first:end] if name in texts):
+            yield line

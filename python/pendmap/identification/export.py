@@ -18,24 +18,7 @@ MOST_ROWS: Final = 2**20 - 1  # Rows of a sheet of Excel below its header
 
 
 def write_readings(report: IdentificationReport, path: str | os.PathLike[str]) -> Path:
-    """Write the readings of an identification with fit and residual; return the file.
-
-    Parameters
-    ----------
-    report : IdentificationReport
-        From :func:`pendmap.identify`; its ``readings`` are written.
-    path : str or path
-        ``.csv``; ``.xlsx`` with one sheet; or ``.mat`` of version 5 with a variable a column, of
-        which ``run`` is a cell array of names. Values that are not known are empty, in ``.mat``
-        NaN.
-
-    Raises
-    ------
-    InputError
-        If the suffix is not known, no whole record is fitted, or it has too many rows for Excel.
-    OSError
-        If the file cannot be written.
-    """
+    """Write the ``readings`` of a report; ``.mat`` has a variable a column, runs as cells."""
     table, suffix = report.readings, Path(path).suffix.lower()
     if suffix == ".xlsx" and len(table) > MOST_ROWS:
         text = f"must have {MOST_ROWS} readings at most, got {len(table)}: .csv and .mat take all"

@@ -10,7 +10,7 @@ import numpy as np
 
 from pendmap.errors import InputError
 from pendmap.formatting import counted, estimate_text, interval, percent
-from pendmap.identification.engineering import QUANTITIES, quantities, swing_amplitude
+from pendmap.identification.engineering import QUANTITIES, lines_of, quantities, swing_amplitude
 from pendmap.identification.methods.trajectory import identification_of
 from pendmap.identification.parameters import OFFSET, SENSOR
 from pendmap.identification.results import FitResult, Followed
@@ -45,22 +45,6 @@ COLUMNS: Final = {
 
 SHORT: Final = {"w0": ("w0", "rad/s"), "c_over_m": ("c/m", "1/s"), "Tr": ("Tr", "rad/s^2")}
 """Symbols and units of the parameters that are said first."""
-
-
-TRADE: Final = {
-    "frequency_hz": "f = {} Hz",
-    "period_s": "period {} s",
-    "zeta": "viscous: zeta = {}",
-    "log_decrement": "log decrement {}",
-    "time_constant_s": "time constant {} s",
-    "Q": "Q = {} at {:.3g} rad, of all losses",
-    "dead_band_rad": "dead band {} rad",
-    "dead_band_deg": "{} degrees",
-    "friction_n_m": "friction {} N m",
-    "viscous_n_m_s": "viscous {} N m s",
-}
-"""Text of each of the quantities of the trade."""
-TRADE_LINES: Final = ([*TRADE][:2], [*TRADE][2:5], [*TRADE][5:8], [*TRADE][8:])
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -371,7 +355,7 @@ def in_short(report: IdentificationReport) -> Iterator[str]:
             if name in best.parameters
             for symbol, unit in [SHORT.get(name, (name, best.unit(name)))]
         )
-        yield from trade_lines(report)
+        yield from lines_of(report.quantities, report.largest_swing / 2)
         yield f"{best.method}: {best.used}"
     runs_text = left_out(report.experiment, report.runs)
     if runs_text:
@@ -386,20 +370,6 @@ def in_short(report: IdentificationReport) -> Iterator[str]:
             f"residual is {report.with_drag.fit.rms:.3g} rad, {report.joint.fit.rms:.3g} without: "
             f"--effect {DRAG} fits it, diagnose looks for more"
         )
-
-
-def trade_lines(report: IdentificationReport) -> Iterator[str]:
-    """Yield the numbers of the trade: of small swings, of all losses, and torques."""
-    known, half = report.quantities, report.largest_swing / 2
-    texts = {}
-    for name in TRADE.keys() & known.keys():
-        one, text = known[name], estimate_text(known[name])
-        if one.stderr is None and one.ci95 is not None and one.ci95[0] < one.value:
-            text = f"{text} {interval(one)}"
-        texts[name] = TRADE[name].format(text, half)
-    for names in TRADE_LINES:
-        if line := ", ".join(texts[name] for name in names if name in texts):
-            yield line
 
 
 def foremost(report: IdentificationReport) -> list[str]:

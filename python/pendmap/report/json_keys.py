@@ -128,7 +128,7 @@ KEYS: Final[dict[str, Keys]] = {
         },
         **{
             f"quantities.{name}.{part}": (unit, f"{text}: {part}")
-            for name, (unit, text) in QUANTITIES.items()
+            for name, (unit, _, text) in QUANTITIES.items()
             for part in ("value", "stderr", "ci95[]")
         },
         "q_amplitude_rad": ("rad", "amplitude of Q: half of the record's largest swing"),

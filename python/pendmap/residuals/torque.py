@@ -200,9 +200,9 @@ def _without_own(
         terms = [np.sin(angle), np.cos(angle)] if name == "angle" else [np.ones(speed.size)]
     which, count = _bins(place[name][known], edge), edge.size - 1
     number = np.maximum(np.bincount(which, minlength=count), 1)
-    own = np.stack([np.bincount(which, term, count) / number for term in terms], axis=1)
-    own /= np.maximum(np.linalg.norm(own, axis=0), 1e-300)
-    rest = np.eye(count) - own @ np.linalg.pinv(own)
+    means = np.stack([np.bincount(which, term, count) / number for term in terms], axis=1)
+    means /= np.maximum(np.linalg.norm(means, axis=0), 1e-300)
+    rest = np.eye(count) - means @ np.linalg.pinv(means)
     return np.where(np.abs(rest) < ROUNDING, 0.0, rest)
 
 
