@@ -20,7 +20,7 @@ from pendmap.errors import InputError
 from pendmap.formatting import estimate_text, typographic
 from pendmap.identification.engineering import swing_amplitude
 from pendmap.identification.methods.registry import BEST
-from pendmap.identification.report import SHORT, table1_table
+from pendmap.identification.report import SHORT, run_entries, table1_table
 from pendmap.identification.table1 import first_state, simulated_peaks
 from pendmap.signal.robust import Z95, span
 
@@ -62,12 +62,7 @@ def sheet(report: IdentificationReport) -> Chart:
         left, sigma = joint.fit.residuals[0], joint.readings[0].sigma
         below = residuals(run, left, sigma, BEST, "residual: record less fit")
         rows = [[*rows[0], _close(run, joint.fit, read, read - gain * left)], [below, *rows[1]]]
-        ratios = {
-            one.name: float(np.sqrt(np.mean(left[one.trusted] ** 2))) / reading.sigma
-            for one, left, reading in zip(
-                joint.runs, joint.fit.residuals, joint.readings, strict=True
-            )
-        }
+        ratios = {one["name"]: one["rms"] / one["noise"] for one in run_entries(report)}
         worst = max(ratios, key=ratios.__getitem__)
         text += f";   residual {ratios[worst]:.3g} times the noise"
         if len(ratios) > 1:

@@ -151,12 +151,8 @@ def _lacking(runs: Sequence[Run]) -> str:
         "pendulum at rest)": free and min(ends) > SMALL * largest,
         "the same run an hour later (does it drift?)": hours < 1,
     }
-    if texts := [text for text, true in lacks.items() if true]:
-        return f"These records lack {'; '.join(texts)}."
-    return (
-        "These records have small and large swings, repeated and hours apart: what remains may be "
-        "a term that the library lacks; --effects adds a formula of your own."
-    )
+    texts = "; ".join(text for text, true in lacks.items() if true)
+    return f"These records lack {texts or 'nothing that the library names: try --effects'}."
 
 
 def _distinguishing(classes: Sequence[Identifiability]) -> str:

@@ -263,7 +263,7 @@ def as_json(report: IdentificationReport) -> dict[str, Any]:
     return {
         "experiment": str(report.experiment.path),
         "run": run.name,
-        "runs": _runs(report),
+        "runs": run_entries(report),
         "noise": report.peaks.sigma,
         "best": None if best is None else best.method,
         "doubts": foremost(report),
@@ -290,7 +290,7 @@ def as_json(report: IdentificationReport) -> dict[str, Any]:
     }
 
 
-def _runs(report: IdentificationReport) -> list[dict[str, Any]]:
+def run_entries(report: IdentificationReport) -> list[dict[str, Any]]:
     """Return the JSON objects of the runs used; rms and noise are those of the joint fit."""
     entries: list[dict[str, Any]] = []
     for k, run in enumerate(report.runs):
