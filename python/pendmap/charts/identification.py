@@ -15,7 +15,7 @@ from pendmap.charts import half_cycles, names
 from pendmap.charts.chart import Axis, Chart, Panel, Sheet, bare, holding, nothing
 from pendmap.charts.marks import QUIET, Band, Line, Mark, Points, Span, Table, Text
 from pendmap.charts.palette import MEASURED, NOISE, NOISE_SAID, drawn, look
-from pendmap.charts.record import FEW, UNUSED
+from pendmap.charts.record import FEW, history
 from pendmap.errors import InputError
 from pendmap.formatting import estimate_text, typographic
 from pendmap.identification.engineering import swing_amplitude
@@ -55,7 +55,8 @@ def sheet(report: IdentificationReport) -> Chart:
         if name in known
     ]
     text = ",  ".join(parts) or "no method gives a model"
-    rows = [[_record(report)], [_envelope_of_fit(report)]]
+    whole = dataclasses.replace(history(run), name="record", title="record")
+    rows = [[whole], [_envelope_of_fit(report)]]
     if joint is not None:
         gain = 1.0 if run.rod_sensor is None else run.rod_sensor.gain
         read = gain * joint.given[0].theta
@@ -69,19 +70,6 @@ def sheet(report: IdentificationReport) -> Chart:
             text += f" in {worst}, the worst of {len(ratios)} runs; drawn: the longest"
     size = (11.0, 6.6) if joint is not None else (WIDTH, 5.6)
     return Chart(f"Identification: {run.name}", typographic(text), rows, size=size)
-
-
-def _record(report: IdentificationReport) -> Panel:
-    """Return the angle of the drawn run over time, also where it is not for fitting."""
-    run, every = report.run, slice(None, None, max(1, report.run.time.size // MOST))
-    time, theta, used = run.time[every], run.theta[every], run.trusted[every]
-    spots: dict[str, Any] = {"size": 3.0 if run.time.size < FEW else 1.3}
-    marks: list[Mark] = [
-        Points(time[~used], theta[~used], colour=UNUSED, name="not for fitting", **spots),
-        Points(time[used], theta[used], colour=MEASURED, name="record", **spots),
-    ]
-    clock, up = names.seconds(run.time), names.angle(holding(theta))
-    return Panel("record", "record", clock, up, marks if (~used).any() else marks[1:])
 
 
 def _close(run: Run, fit: TrajectoryFit, read: Floats, made: Floats) -> Panel:
@@ -98,7 +86,7 @@ def _close(run: Run, fit: TrajectoryFit, read: Floats, made: Floats) -> Panel:
         time, line = smooth, motion + np.interp(smooth, time, line - theta[near])
     shown = near & run.trusted
     marks: list[Mark] = [
-        Points(run.time[shown], read[shown], colour=MEASURED, size=3.0, order=1.0),
+        Points(run.time[shown], read[shown], colour=MEASURED, size=3.0, order=1.0, name="readings"),
         dataclasses.replace(_line(time, line, BEST, 1.4), name="fit"),
     ]
     up = names.angle(holding(line, read[shown]))

@@ -48,16 +48,6 @@ def swing_amplitude(curve: Floats, w0: float) -> Floats:
     return np.asarray(np.where(above, math.pi * np.sqrt(energy / 2), swing), np.float64)
 
 
-def inertia_of(known: Mapping[str, float], gravity: float, w0: float) -> float:
-    """Return the moment of inertia about the pivot, kg m^2; nan if ``[rig]`` does not tell it.
-
-    It is ``inertia``, or ``m g l / w0^2`` of a ``mass`` with its centre ``length`` from the pivot;
-    by default that is ``length_m``, as of a bob on a light rod.
-    """
-    length = known.get("length", known.get("length_m", math.nan))
-    return known.get("inertia", known.get("mass", math.nan) * gravity * length / w0**2)
-
-
 def quantities(
     result: Parameters, amplitude: float, known: Mapping[str, float], gravity: float
 ) -> dict[str, Estimate]:
@@ -77,7 +67,10 @@ def quantities(
 
     def computed(row: Floats) -> Floats:
         p = dict(zip(names, row.tolist(), strict=True))
-        return _computed(p, amplitude, inertia_of(known, gravity, p["w0"]))
+        # Of a mass whose centre is at a length from the pivot, or of a bob on a light rod.
+        length = known.get("length", known.get("length_m", math.nan))
+        pendulum = known.get("mass", math.nan) * gravity * length / p["w0"] ** 2
+        return _computed(p, amplitude, known.get("inertia", pendulum))
 
     covariance = np.diag(errors**2)
     if result.joint_covariance is not None and {*names} <= {*result.joint_covariance[0]}:
