@@ -104,7 +104,7 @@ def record() -> None:
 
 def identification() -> None:
     """The decay by each model, and what each misses, on a virtual rig like the paper's."""
-    sheet = charts.sheet(
+    sheet = charts.whole(
         paper_figures.report(),
         parts=("decay",),
         title="The decay by each model",

@@ -10,17 +10,31 @@ import numpy as np
 from pendmap.charts import names
 from pendmap.charts.chart import Axis, Chart, Panel, holding
 from pendmap.charts.identification import error_panels
-from pendmap.charts.marks import QUIET, Areas, Band, Level, Line, Mark, Points, Span, bars
-from pendmap.charts.palette import NOISE, look
+from pendmap.charts.marks import (
+    INK,
+    QUIET,
+    Areas,
+    Band,
+    Level,
+    Line,
+    Mark,
+    Points,
+    Span,
+    Text,
+    bars,
+)
+from pendmap.charts.palette import NOISE, NOISE_SAID, look
+from pendmap.formatting import typographic
+from pendmap.identification.sensitivity import sensitivities
 from pendmap.model.labels import unit_of
 from pendmap.signal.robust import Z95
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from pendmap.charts.marks import Floats
     from pendmap.comparison.forecast import Forecast
     from pendmap.diagnosis import Discrepancy
+    from pendmap.diagnosis.candidates import Candidate
 
 ACCELERATION: Final = "rad/s²"  # Unit of a torque per moment of inertia
 RMS: Final = "rms (mrad)"  # Root mean square of residuals, with its unit
@@ -40,8 +54,8 @@ RUNS: Final = 3  # Number of runs whose residuals are drawn: those with the wors
 PART: Final = 0.1
 """Part of a small swing over which residuals are averaged; model errors are slower."""
 CYCLES: Final = 3  # Number of free runs in figure 7: those held out first, then the longest
-RANKED: Final = 8  # Number of candidates in the ranking
-SIZE: Final = (8.6, 12.2)  # Width and height of the sheet in inches
+SHARES: Final = [(float(share), str(share)) for share in (0, 25, 50, 75, 100)]
+SIZE: Final = (9.2, 12.2)  # Width and height of the sheet in inches, of two effects or fewer
 
 
 def sheet(result: Discrepancy) -> Chart:
@@ -58,12 +72,13 @@ def sheet(result: Discrepancy) -> Chart:
     if result.forecasts:
         gap.append(forecast(result, max(result.forecasts, key=lambda one: one.starts)))
     rows += [gap, [torque(result, "angle"), torque(result, "velocity")]]
-    shown = shown_coefficients(result)[:1]
-    # A single run cannot be compared with others.
-    last = coefficients(result, shown[0]) if shown else torque(result, "amplitude")
-    rows.append([ranking(result), last])
-    heights += [1.2, 1.2, 1.5]
-    return Chart(_title(result), subtitle, rows, heights=heights, size=SIZE, letters=False)
+    last = [ranking(result), *(effect_panels(result) or [torque(result, "amplitude")])]
+    if len(last) % 2 and len(last) > 1:
+        last.append(torque(result, "amplitude"))
+    rows += [last[k : k + 2] for k in range(0, len(last), 2)]
+    heights += [1.2, 1.2, 1.5, *[1.2] * (len(last) // 2 - 1)]
+    size = SIZE[0], SIZE[1] + 2.2 * (len(last) // 2 - 1)
+    return Chart(_title(result), subtitle, rows, heights=heights, size=size, letters=False)
 
 
 def parts(result: Discrepancy) -> dict[str, Chart]:
@@ -74,8 +89,10 @@ def parts(result: Discrepancy) -> dict[str, Chart]:
     torques = [torque(result, over) for over in OVER_SAID if _torque_rows(result, over)]
     pairs = [torques[k : k + 2] for k in range(0, len(torques), 2)]
     ranked = [ranking(result)] if result.scores.best() else []
-    by_itself = "what each effect of the library would explain by itself"
-    runs = [coefficients(result, name) for name in shown_coefficients(result)]
+    by_itself = "what each effect promises to close by itself, and closes beside the others"
+    single = len(result.data.fitted) == 1
+    effects = effect_panels(result)
+    runs, alone = ([], [[one] for one in effects]) if single else (effects, [])
     worst = "the runs with the largest residuals of the baseline"
     cycles = _cycles(result)
     first_peak = "from the first measured peak on"
@@ -85,6 +102,7 @@ def parts(result: Discrepancy) -> dict[str, Chart]:
         "torque": (LACKED, "per moment of inertia; bands: 95 %", pairs, 1.1 + 2.3 * len(pairs)),
         "ranking": ("Ranking", by_itself, [ranked], 3.5),
         "runs": ("Run by run", "bars and band: 95 %", [runs], 3.5),
+        "parts": ("The effects in the record", worst, alone, 1.1 + 1.7 * len(alone)),
         "figure_7": ("Simulated periods and peaks", first_peak, cycles, 1.1 + 2.6 * len(cycles)),
     }
     return {
@@ -227,25 +245,59 @@ def torque(result: Discrepancy, over: str) -> Panel:
 
 
 def ranking(result: Discrepancy) -> Panel:
-    """Return the greatest scores at the baseline, with the effects found in colour."""
-    best = [result.scores.scores[k] for k in result.scores.best()[:RANKED]]
-    level = result.base.fitted.noise.level
-    values = [max(score.gain / level, 0.1) for score in best]
-    words = {AFTER: "found", ALIKE: "indistinguishable from it", OTHER: "not accepted"}
-    boxes: dict[str, list[Floats]] = {}
-    ticks = []
-    for place, (score, value) in enumerate(zip(best, values, strict=True)):
-        y = float(len(best) - 1 - place)
-        name = score.candidate.name
-        ticks.append((y, name))
-        colour = ALIKE if any(name in one for one in result.equivalent) else OTHER
-        colour = AFTER if name in {effect.name for effect in result.effects} else colour
-        corners = [(1.0, y - 0.35), (value, y - 0.35), (value, y + 0.35), (1.0, y + 0.35)]
-        boxes.setdefault(colour, []).append(np.array(corners))
-    marks = [Areas(boxes[c], colour=c, name=text) for c, text in words.items() if c in boxes]
-    across = Axis("score G", (1.0, max(30.0, 2 * max(values, default=1.0))), "log")
-    up = Axis("", (-0.6, max(len(best), 1) - 0.4), ticks=ticks)
-    return Panel("ranking", "Candidates at the baseline", across, up, marks)
+    """Return the share of the gap that each effect of the table closes, and the fall of the BIC."""
+    rows = result.standings.rows
+    marks: list[Mark] = []
+    for row, y in zip(rows, range(len(rows) - 1, -1, -1), strict=True):
+        colour, text = OTHER, "other effects"
+        if row.mark in {"alike", "wider"}:
+            colour, text = ALIKE, "does the same"
+        elif row.mark not in {"", "less"}:
+            colour, text = AFTER, "found" if result.effects else "nearest, not claimed"
+        value = 100 * (row.alone or 0.0)
+        box = np.array([(0, y - 0.3), (value, y - 0.3), (value, y + 0.3), (0, y + 0.3)], float)
+        marks.append(Areas([box], colour=colour, name=f"{text}: alone"))
+        if row.last is not None:
+            look: dict[str, Any] = {"marker": "D", "size": 5.5, "fill": "#ffffff", "order": 4.0}
+            at = np.array([100 * row.last]), np.array([float(y)])
+            marks.append(Points(*at, colour=INK, edge_width=1.2, name="beside the others", **look))
+        if row.bic is not None:
+            words = typographic(f"BIC {row.cells[3]}")
+            marks.append(Text(105.0, y, words, colour=QUIET, align=("left", "center"), size=7.5))
+    across = Axis("share of the squared gap closed (%)", (0.0, 130.0), ticks=SHARES)
+    ticks = [(float(y), row.candidate.name) for y, row in enumerate(reversed(rows))]
+    up = Axis("", (-0.6, max(len(rows), 1) - 0.4), ticks=ticks)
+    return Panel("ranking", "What each effect closes; fall of the BIC", across, up, marks)
+
+
+def effect_panels(result: Discrepancy) -> list[Panel]:
+    """Return a panel of each effect of the best model: run by run, or its part of one record."""
+    if len(result.data.fitted) > 1:
+        return [coefficients(result, name) for name in shown_coefficients(result)]
+    return [part_of_record(result, one.candidate) for one in result.assessment.identified]
+
+
+def part_of_record(result: Discrepancy, candidate: Candidate) -> Panel:
+    """Return what an effect changes in a record that no other parameter of the model can change."""
+    fitted = result.nearest.fitted
+    slopes = sensitivities(fitted.fit, fitted.runs, (), fitted.fit.model)
+    free = candidate.free[0]
+    place, (run,) = slopes.names.index(free), fitted.runs
+    column, others = slopes.columns[:, place], np.delete(slopes.columns, place, axis=1)
+    others = others / np.maximum(np.linalg.norm(others, axis=0), 1e-300)
+    alone = column - others @ np.linalg.lstsq(others, column, rcond=1e-9)[0]
+    change = np.full(run.time.size, math.nan)
+    shown = np.flatnonzero(run.counted)[: alone.size]
+    change[shown] = 1e3 * fitted.fit[free] * alone[: shown.size] * run.sigmas[shown]
+    wide = Z95 * 1e3 * float(np.median(result.data.fitted[0].sigmas))
+    marks: list[Mark] = [
+        Span((-wide, wide), axis="y", colour=NOISE, name=NOISE_SAID),
+        Line(run.time, change, colour=AFTER, width=0.8, name="effect"),
+    ]
+    claimed = "" if result.effects else " (not claimed)"
+    title = f"{candidate.name}{claimed}: what it alone changes in the record"
+    across, up = Axis("time (s)", holding(run.time, margin=0.01)), Axis("mrad", holding(change))
+    return Panel(f"part {candidate.name}", title, across, up, marks)
 
 
 def shown_coefficients(result: Discrepancy) -> list[str]:

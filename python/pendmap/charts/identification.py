@@ -8,16 +8,19 @@ import textwrap
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
 from pendmap.analysis.trajectory import simulate
 from pendmap.charts import half_cycles, names
 from pendmap.charts.chart import Axis, Chart, Panel, Sheet, bare, holding, nothing
-from pendmap.charts.marks import QUIET, Band, Level, Line, Mark, Points, Table, Text
+from pendmap.charts.marks import QUIET, Band, Line, Mark, Points, Span, Table, Text
 from pendmap.charts.palette import MEASURED, NOISE, NOISE_SAID, drawn, look
+from pendmap.charts.record import FEW, history
 from pendmap.errors import InputError
 from pendmap.formatting import estimate_text, typographic
+from pendmap.identification.engineering import swing_amplitude
 from pendmap.identification.methods.registry import BEST
-from pendmap.identification.report import table1_table
+from pendmap.identification.report import SHORT, run_entries, table1_table
 from pendmap.identification.table1 import first_state, simulated_peaks
 from pendmap.signal.robust import Z95, span
 
@@ -26,12 +29,15 @@ if TYPE_CHECKING:
 
     from pendmap.charts.marks import Ends, Floats
     from pendmap.identification import IdentificationReport, PeakErrors, Peaks
+    from pendmap.identification.fit import TrajectoryFit
     from pendmap.model import Rig
     from pendmap.records import Run
 
 WIDTH: Final = 8.6  # Width of a column, inches
 SAMPLES: Final = 64  # Samples per swing of a simulation
 MOST: Final = 6_000  # Greatest number of residuals drawn
+SWINGS: Final = 3  # Swings of small amplitude in the close view of a fit
+CURVE: Final = 600  # Points of the curve in it
 LINE: Final = 0.2  # Height of a row of the table, inches
 LETTERS: Final = 110  # Letters per line below the table
 NOTHING: Final = "no method can be applied, or there are fewer than three peaks"
@@ -39,14 +45,87 @@ QUANTITIES: Final = {"w0": "w0 (rad/s)", "c_over_m": "c/m (1/s)", "Tr": "Tr (rad
 """Estimates in the table, with the heads of their columns."""
 
 
-def sheet(
+def sheet(report: IdentificationReport) -> Chart:
+    """Return the record, a close view of the fit, its residual, and the envelope."""
+    run, best, joint = report.run, report.sound, report.joint
+    known = {} if best is None else best.estimates
+    parts = [
+        f"{symbol} = {estimate_text(known[name])} {unit.replace('^2', '²')}"
+        for name, (symbol, unit) in SHORT.items()
+        if name in known
+    ]
+    text = ",  ".join(parts) or "no method gives a model"
+    whole = dataclasses.replace(history(run), name="record", title="record")
+    rows = [[whole], [_envelope_of_fit(report)]]
+    if joint is not None:
+        gain = 1.0 if run.rod_sensor is None else run.rod_sensor.gain
+        read = gain * joint.given[0].theta
+        left, sigma = joint.fit.residuals[0], joint.readings[0].sigma
+        below = residuals(run, left, sigma, BEST, "residual: record less fit")
+        rows = [[*rows[0], _close(run, joint.fit, read, read - gain * left)], [below, *rows[1]]]
+        ratios = {one["name"]: one["rms"] / one["noise"] for one in run_entries(report)}
+        worst = max(ratios, key=ratios.__getitem__)
+        text += f";   residual {ratios[worst]:.3g} times the noise"
+        if len(ratios) > 1:
+            text += f" in {worst}, the worst of {len(ratios)} runs; drawn: the longest"
+    size = (11.0, 6.6) if joint is not None else (WIDTH, 5.6)
+    return Chart(f"Identification: {run.name}", typographic(text), rows, size=size)
+
+
+def _close(run: Run, fit: TrajectoryFit, read: Floats, made: Floats) -> Panel:
+    """Return the readings of the first swings, and those of the fit as a line."""
+    sensor, (theta, velocity) = run.rod_sensor, fit.curves[0]
+    begin = float(run.time[run.trusted][0])
+    ends = (begin, begin + SWINGS * math.tau / fit["w0"])
+    near = (run.time >= ends[0]) & (run.time <= ends[1]) & np.isfinite(theta)
+    time, line = run.time[near], made[near]
+    if sensor is None and time.size > 1:
+        # Between readings the model moves on smoothly; the sensor's own error is added.
+        smooth = np.linspace(time[0], time[-1], CURVE)
+        motion = CubicHermiteSpline(time, theta[near], velocity[near])(smooth)
+        time, line = smooth, motion + np.interp(smooth, time, line - theta[near])
+    shown = near & run.trusted
+    marks: list[Mark] = [
+        Points(run.time[shown], read[shown], colour=MEASURED, size=3.0, order=1.0, name="readings"),
+        dataclasses.replace(_line(time, line, BEST, 1.4), name="fit"),
+    ]
+    up = names.angle(holding(line, read[shown]))
+    if sensor is not None:
+        what = "angular rate" if sensor.unit == "rad/s" else "acceleration"
+        up = Axis(f"{what} ({sensor.unit.replace('s2', 's²')})", up.ends)
+    return Panel("fit", "fit: the first swings", Axis(names.TIME, ends), up, marks)
+
+
+def _envelope_of_fit(report: IdentificationReport) -> Panel:
+    """Return the measured peaks, and the amplitude of the model's swings as a line."""
+    run, turned, best = report.run, report.peaks.turned, report.sound
+    size = np.abs(turned.amplitude - (0.0 if best is None else best.zero))
+    spots: dict[str, Any] = {"fill": "#ffffff", "edge_width": 0.8, "order": 3.0}
+    marks: list[Mark] = [
+        Points(turned.time, size, colour=MEASURED, size=3.2, name="measured peaks", **spots)
+    ]
+    if not size.size:
+        marks = []
+    reach = [np.zeros(1), size]
+    if (joint := report.joint) is not None:
+        swing = swing_amplitude(joint.fit.curves[0], joint.fit["w0"])
+        marks.append(dataclasses.replace(_line(run.time, swing, BEST, 1.4), name="fit"))
+        reach.append(swing)
+    elif best is not None and not report.table.left_out and best.method not in report.table.lost:
+        one = Decay.of(best.rig, report.peaks, best.zero)
+        marks.append(_line(one.peak_time, np.abs(one.peak), best.method, 1.4))
+    up = Axis("amplitude (rad)", (0.0, 1.06 * holding(*reach, margin=0.0)[1]))
+    return Panel("envelope", "envelope of the swings", names.seconds(run.time), up, marks)
+
+
+def whole(
     report: IdentificationReport,
     *,
     parts: Sequence[str] = (),
     title: str | None = None,
     subtitle: str | None = None,
 ) -> Sheet:
-    """Return the parts, by default all, in one column, or more than two in two columns."""
+    """Return parts, by default all methods' figures, in one column, or many in two columns."""
     for name in parts:
         if name not in PARTS:
             raise InputError(f"parts must be among {', '.join(PARTS)}, got {name!r}")
@@ -166,19 +245,19 @@ def _noise(x: Floats, error: Floats) -> list[Mark]:
 
 
 def residuals(run: Run, residual: Floats, sigma: float, method: str, title: str) -> Panel:
-    """Return the residuals of a model over a record, with lines at the standard deviation."""
+    """Return the residuals of a model over a record, with a band of their noise."""
     gyroscope = run.gyroscope
     size, unit = (1e3, "mrad") if gyroscope is None else (1e3 * gyroscope.gain, "mrad/s")
     away = size * np.where(run.trusted, residual, np.nan)
     every, noise = max(1, away.size // MOST), size * sigma
     known = np.abs(away[np.isfinite(away)])
-    top = max(1.4 * float(np.percentile(known, 99.5)), 1.6 * noise) if known.size else noise
-    dots: dict[str, Any] = {"colour": look(method).colour, "size": 1.2}
+    top = max(1.4 * float(np.percentile(known, 99.5)), 2.6 * noise) if known.size else noise
+    dots: dict[str, Any] = {"colour": look(method).colour, "size": 1.2 if away.size > FEW else 3.0}
     marks: list[Mark] = [Points(run.time[::every], away[::every], **dots)]
-    lines: dict[str, Any] = {"colour": MEASURED, "width": 0.8, "dash": "--"}
-    lines["name"] = "standard deviation of its noise"
-    marks += [Level(end, **lines) for end in (-noise, noise)]
-    return Panel("residual", title, names.seconds(run.time), Axis(unit, (-top, top)), marks)
+    marks.append(Span((-Z95 * noise, Z95 * noise), axis="y", colour=NOISE, name=NOISE_SAID))
+    return Panel(
+        "residual", title, names.seconds(run.time), Axis(f"residual ({unit})", (-top, top)), marks
+    )
 
 
 def errors(report: IdentificationReport) -> Chart:

@@ -62,7 +62,7 @@ def _one(run: Run) -> Chart:
     return Chart(
         f"Record {run.name}",
         subtitle,
-        [[_flags(run)], [_history(run)], below],
+        [[_flags(run)], [history(run)], below],
         heights=(0.15, 1.25, 1.0),
         size=(WIDTH, 6.3 + 0.19 * len(lines)),
         notes=lines,
@@ -95,7 +95,8 @@ def _samples(run: Run, time: Floats, width: float) -> list[Mark]:
     return marks
 
 
-def _history(run: Run) -> Panel:
+def history(run: Run) -> Panel:
+    """Return the angle over time, with what is for fitting and what is not."""
     spans = [(part.from_s, part.to_s) for part in run.segments if not part.used]
     marks = _samples(run, run.time, 0.8)
     if spans:

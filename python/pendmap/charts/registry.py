@@ -5,6 +5,7 @@ The chart of a dataset is made by the function ``chart`` of the module named as 
 
 from __future__ import annotations
 
+import dataclasses
 import importlib
 import pkgutil
 from typing import TYPE_CHECKING, Any, Final
@@ -34,6 +35,7 @@ RESULTS: Final = {
     "Discrepancy": "diagnosis",
 }
 """Results that are no datasets, by the names of their classes, and the modules of their charts."""
+ALL: Final = "all"  # Layer of all panels of a result whose figure shows a few of them
 BUILDERS: Final[dict[str, Callable[..., Chart]]] = {}  # Builders of kinds without a module here
 _MODULES: Final = {module.name for module in pkgutil.iter_modules(charts.__path__)}
 _BYTES: Final = 16  # Memory of a value of a dataset during drawing
@@ -218,5 +220,12 @@ def of_result(
         if colours or names:
             dataset = legend.with_looks(dataset, colours or {}, names or {})
         return build(dataset, layer=layer, cells=cells)
-    made: Chart | Sheet = importlib.import_module(f"pendmap.charts.{name}").sheet(result)
-    return made.only(layer)
+    module = importlib.import_module(f"pendmap.charts.{name}")
+    made: Any = module.sheet(result)
+    if hasattr(module, "whole") and layer not in {None, *(panel.name for panel in made.panels)}:
+        whole: Sheet = module.whole(result)
+        if layer == ALL:
+            return whole
+        made = dataclasses.replace(whole, columns=[[made], *whole.columns])
+    shown: Chart | Sheet = made.only(layer)
+    return shown

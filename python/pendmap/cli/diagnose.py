@@ -68,7 +68,7 @@ def command(
     # The matrices are tall and narrow: threads would cost more than they save.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from pendmap.diagnosis import diagnose, diagnosed_model
-    from pendmap.diagnosis.result import as_text, ranking_table
+    from pendmap.diagnosis.result import as_text
     from pendmap.diagnosis.summary import as_json
     from pendmap.model import load_formulas, save_model
     from pendmap.model.effects import definition
@@ -88,5 +88,5 @@ def command(
     save = functools.partial(save_model, diagnosed_model(result, command_line()))
     written = outputs.write(result, save, keep=True)
     more = {"model": written.name(outputs.path("model")), "simd": instruction_set()}
-    lines = itertools.chain(as_text(result), ["", table(*ranking_table(result))])
+    lines = itertools.chain(as_text(result), ["", table(*result.table_cells())])
     outputs.finish(written, lambda: as_json(result) | more, lines)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from pendmap.cli.parse import options
 from pendmap.cli.parse.options import argument, flag
 from pendmap.cli.parse.signature import options_of, reading_options, take_reading
-from pendmap.cli.parse.types import EFFECT, METHOD
+from pendmap.cli.parse.types import EFFECT, METHOD, TABLES
 from pendmap.cli.show import Outputs, Written, command_line, first_of_all
 from pendmap.errors import InputError, instruction_set
 
@@ -32,7 +32,12 @@ if TYPE_CHECKING:
 )
 @reading_options
 @options.simd_option
-@options.output_options((".toml", ".nc"))
+@options.output_options((".toml", ".nc", *TABLES))
+@flag(
+    "--plot-all",
+    "The figure has all panels of all methods: half cycles, decrements, errors, table.",
+    group=options.OUTPUT,
+)
 @flag(
     "--verbose",
     "Also the tables of all methods, intervals, and what was noticed.",
@@ -51,14 +56,17 @@ def command(
     EXPERIMENT is a file with times and angles, or a folder with an experiment.toml. The default
     method fits a trajectory to the whole record; --verbose lists the paper's method and others too.
     In brackets: standard errors in the last digits. Writes identify.toml, a model for --model of
-    every other command, identify.png and identify.rrd if no output is named; a .nc has all of the
-    result, for plot and pendmap.load.
+    every other command, identify.png (record, fit, residual, envelope) and identify.rrd if no
+    output is named. A .nc has all of the result, for plot and pendmap.load; a .csv, .xlsx or .mat
+    has time, reading, fit, residual and run of every reading.
     """
+    from pendmap.charts.registry import ALL
     from pendmap.identification import identified_model, identify
     from pendmap.identification.report import as_json, in_short
     from pendmap.model import save_model
     from pendmap.records import files_of, read_experiment
 
+    layer = ALL if given.pop("plot_all") else None
     outputs = Outputs.take(given, "identify", files_of(path), default=("model", "plot", "rerun"))
     experiment = read_experiment(path, **take_reading(given))
     with outputs.progress("identify") as progress:
@@ -75,5 +83,6 @@ def command(
     except InputError:
         finish(Written())
         raise
-    written = outputs.write(report, functools.partial(save_model, model), keep=True)
+    save = functools.partial(save_model, model)
+    written = outputs.write(report, save, keep=True, layer=layer)
     finish(written)

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import click
 
 from pendmap.cli.parse.model_options import model_from
-from pendmap.cli.parse.types import PICTURES, REPORTS, default_file
+from pendmap.cli.parse.types import PICTURES, REPORTS, TABLES, default_file
 from pendmap.errors import InputError, NotWrittenError, escaped, named, one_line
 from pendmap.files import COMPLETE, held_interrupts
 from pendmap.formatting import columns, duration, json_text, wrapped
@@ -38,17 +38,26 @@ if TYPE_CHECKING:
 _BOLD: Final = re.compile("(\x1b\\[[01]m)")  # What click.style writes
 _LONG: Final = 60.0  # Time left that is worth a line, s
 _SOON: Final = (3.0, 1e-4)  # Time, s, and share of the work from which on both tell the rest
-_ENDS: Final = {"model": ".toml", "out": ".nc", "plot": ".png", "report": ".html", "rerun": ".rrd"}
+_ENDS: Final = {
+    "model": ".toml",
+    "out": ".nc",
+    "table": ".csv",
+    "plot": ".png",
+    "report": ".html",
+    "rerun": ".rrd",
+}
 """What a command may write, in this order, and the suffix of its default file."""
 _KINDS: Final = {
     **dict.fromkeys(PICTURES, "plot"),
     **dict.fromkeys(REPORTS, "report"),
+    **dict.fromkeys(TABLES, "table"),
     ".rrd": "rerun",
     ".toml": "model",
 }
 """What a file of ``--out`` is, by its suffix; other files are the result itself."""
 _WRITERS: Final = {
     "out": "files.dataset.save",
+    "table": "identification.export.write_readings",
     "plot": "render.draw",
     "report": "render.write_report",
     "rerun": "viewer.view",

@@ -7,20 +7,27 @@ import functools
 import math
 from typing import TYPE_CHECKING, Final
 
+import numpy as np
+
 from pendmap.diagnosis.candidates import count_choices
 from pendmap.formatting import counted
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from pendmap.comparison.data import DataSplit
     from pendmap.diagnosis.candidates import Candidate
     from pendmap.diagnosis.fitted_model import FittedModel
     from pendmap.diagnosis.named import NamedEffect
     from pendmap.diagnosis.scores import Scores
     from pendmap.diagnosis.state import ScoredModel
     from pendmap.diagnosis.verdict import Assessment, Identifiability
+    from pendmap.records import Run
 
 DETECTION_PROBABILITY: Final = 0.95  # Probability of detection of an effect at its detection limit
+
+LARGE: Final = 1.0  # Swings from which records show drag and the angle's harmonics, rad
+SMALL: Final = 0.1  # Last swing over the largest from which a decay is not seen to its end
 
 UNDETECTABLE: Final = 10.0
 """Limit over the largest typical size above which an effect is undetectable."""
@@ -100,7 +107,8 @@ def required_gain(threshold: float, count: int) -> float:
     )
 
 
-def advise(
+def advise(  # noqa: PLR0913, PLR0917 (what was found, in what)
+    data: DataSplit,
     best: ScoredModel,
     nearest: ScoredModel,
     assessment: Assessment,
@@ -117,24 +125,43 @@ def advise(
     limits = detection_limits(scores, nearest.fitted.level, best.fitted, chance)
     sentences: list[str | None] = []
     if assessment.verdict in {"unknown", "partial"}:
-        sentences.append(
-            "Repeat one free decay several times over an hour: whether the residual repeats, and "
-            "what it varies with, indicates its cause."
-        )
+        sentences.append(_lacking(data.runs))
     classes = [one for one in assessment.identified if len(one.equivalent) > 1]
     if classes:
-        sentences += map(_distinguishing, classes)
+        sentences.append(_distinguishing(classes))
     elif assessment.verdict in {"none", "named"}:
         sentences.append(_narrowing(assessment, effects) or _lowering(limits))
     return Advice(" ".join(filter(None, sentences)) or None, limits)
 
 
-def _distinguishing(one: Identifiability) -> str:
+def _lacking(runs: Sequence[Run]) -> str:
+    """Return the sentence on what records lack that would show the cause of a residual."""
+    free = [run for run in runs if run.kind == "free" and run.moves]
+    sizes = [np.abs(run.theta[run.trusted]) for run in free]
+    largest = max((float(size.max()) for size in sizes), default=0.0)
+    ends = [float(size[-max(size.size // 20, 1) :].max()) for size in sizes]
+    times = [run.lab_time_s + run.time[[0, -1]] for run in runs]
+    hours = (np.max(times) - np.min(times)) / 3600
+    lacks = {
+        "a second run from the same release (does the residual repeat?)": len(free) == 1,
+        "free decays (friction and drag without the drive)": not free,
+        f"swings of more than {largest:.2g} rad (drag, and what depends on the angle)": free
+        and largest < LARGE,
+        f"the end of a decay, below {min(ends, default=0.0):.2g} rad (friction, and what holds the "
+        "pendulum at rest)": free and min(ends) > SMALL * largest,
+        "the same run an hour later (does it drift?)": hours < 1,
+    }
+    texts = "; ".join(text for text, true in lacks.items() if true)
+    return f"These records lack {texts or 'nothing that the library names: try --effects'}."
+
+
+def _distinguishing(classes: Sequence[Identifiability]) -> str:
     """Return the sentence on names that the records do not distinguish."""
-    alike = [r.candidate for r in one.alternatives if r.alike and not r.contains]
-    revealed: dict[str, list[str]] = {}
-    for candidate in (one.candidate, *alike):
-        revealed.setdefault(candidate.definition.revealed_by, []).append(candidate.name)
+    revealed: dict[str, dict[str, None]] = {}
+    for one in classes:
+        alike = [r.candidate for r in one.alternatives if r.alike and not r.contains]
+        for candidate in (one.candidate, *alike):
+            revealed.setdefault(candidate.definition.revealed_by, {})[candidate.name] = None
     groups = [f"{', '.join(names)} ({what or 'unknown'})" for what, names in revealed.items()]
     return f"To distinguish equally good names, record what reveals {', '.join(groups)}."
 

@@ -20,7 +20,9 @@ from pendmap.comparison.forecast import (
 )
 from pendmap.diagnosis.advice import Advice, advise
 from pendmap.diagnosis.named import NamedEffect, effect_values
-from pendmap.formatting import Estimate
+from pendmap.diagnosis.table import HEAD, NOTE, Standings
+from pendmap.formatting import Estimate, estimate_text
+from pendmap.identification.report import SHORT
 from pendmap.identification.results import ARRAYS, FitResult, Followed
 from pendmap.model.effects import definition
 from pendmap.model.labels import unit_of
@@ -33,7 +35,6 @@ if TYPE_CHECKING:
 
     from pendmap.comparison.data import DataSplit
     from pendmap.comparison.forecast import Part, Reasons
-    from pendmap.diagnosis.candidates import Candidate
     from pendmap.diagnosis.scores import Scores
     from pendmap.diagnosis.state import Attempt, ScoredModel
     from pendmap.diagnosis.verdict import Assessment
@@ -68,7 +69,7 @@ TORQUE: Final = unit_of("torque")  # Unit of a torque per moment of inertia
 
 WHERE: Final = 3  # Number of bins of a residual torque in the summary
 
-RANKED: Final = 8  # Number of candidates in the table of scores
+"""End of the line of an effect whose name is approximate."""
 
 MOST_EFFECTS: Final = 3  # Default of the largest number of effects that are added
 
@@ -130,7 +131,20 @@ class Discrepancy(FitResult):
 
     def text_parts(self) -> tuple[list[tuple[list[str], list[list[str]]]], list[str]]:
         """Return the table and the lines that ``pendmap diagnose`` prints."""
-        return [ranking_table(self)], list(as_text(self))
+        return [self.table_cells()], list(as_text(self))
+
+    @property
+    def standings(self) -> Standings:
+        """Effects of the best model and the other candidates, as in the table."""
+        fitted = self.nearest.fitted, self.base.fitted, self.data.fitted
+        identified = self.assessment.identified
+        return Standings(
+            identified, self.effects, *fitted, self.scores, self.attempts, self.definition
+        )
+
+    def table_cells(self) -> tuple[list[str], list[list[str]]]:
+        """Return header and rows of the table of effects."""
+        return HEAD, [row.cells for row in self.standings.rows]
 
     @property
     def parameters(self) -> Mapping[str, Estimate]:
@@ -138,7 +152,7 @@ class Discrepancy(FitResult):
         fit, wider = self.best.fitted.fit, math.sqrt(self.best.fitted.widening)
         estimates = {}
         for name, written in zip(fit.names, self.written_names, strict=True):
-            value, stderr = fit[name], wider * (fit.estimates[name].stderr or math.nan)
+            value, stderr = self.in_turn(name), wider * (fit.estimates[name].stderr or math.nan)
             half = Z95 * math.hypot(stderr, self.runs.between(name))
             known = math.isfinite(half)
             ci95 = (value - half, value + half) if known else None
@@ -149,6 +163,14 @@ class Discrepancy(FitResult):
                 known_error = estimates[name].stderr if name in estimates else None
                 estimates[name] = Estimate(value, known_error, effect.ci95.get(parameter))
         return estimates
+
+    def in_turn(self, name: str) -> float:
+        """Return the value of a fitted parameter, of a phase from -pi to pi."""
+        value, (effect, _, parameter) = self.best.fitted.fit[name], name.rpartition(".")
+        phase = name.partition("[")[0] == "phi"
+        if effect:
+            phase = self.definition(effect)[parameter].role == "phase"
+        return math.remainder(value, math.tau) if phase else value
 
     @property
     def written_names(self) -> list[str]:
@@ -261,7 +283,8 @@ class Discrepancy(FitResult):
     @functools.cached_property
     def advice(self) -> Advice:
         """Recommended next record, and detection limits of effects that were not found."""
-        return advise(self.best, self.nearest, self.assessment, self.effects, self.beside)
+        fitted = self.data, self.best, self.nearest
+        return advise(*fitted, self.assessment, self.effects, self.beside)
 
     @functools.cached_property
     def cycles(self) -> tuple[Cycles, ...]:
@@ -274,46 +297,27 @@ class Discrepancy(FitResult):
         return compute_part(self.reasons, field, lambda: compared(self.data, *models), ())
 
 
-def shape_text(result: Discrepancy, candidate: Candidate) -> str:
-    """Return the shape of a candidate in SI, with units."""
-    shape = candidate.shape_in(result.base.fitted.fit.model.units)
-    return ", ".join(
-        f"{name} = {value:.3g} {unit_of(f'{candidate.name}.{name}', result.definition)}".rstrip()
-        for name, value in shape.items()
-    )
-
-
-def ranking_table(result: Discrepancy) -> tuple[list[str], list[list[str]]]:
-    """Return header and rows of the table of candidates at the baseline."""
-    refitted = {a.effects[0]: a for a in reversed(result.attempts) if a.stage == 0}
-    rows = []
-    for k, row in zip(result.scores.best()[:RANKED], ranking(result), strict=False):
-        name, tried = row["name"], refitted.get(row["name"])
-        shape = shape_text(result, result.scores.scores[k].candidate)
-        gains = (None, None) if tried is None else (tried.bic_gain, tried.held_out_gain)
-        cells = ["" if gain is None else f"{gain:.1f}" for gain in gains]
-        rows.append([name, shape, f"{row['score']:.1f}", *cells])
-    return ["candidate", "shape", "score G", "fall of BIC", "gain held out"], rows
-
-
 def as_text(result: Discrepancy) -> Iterator[str]:
     """Yield the lines of a summary: doubts about a unit, then the verdict and its details."""
     runs = result.data.runs
     yield from doubt_lines(result.data.experiment, *runs)
     gap, assessment = result.gap, result.assessment
     yield f"Verdict: {result.verdict}: {SAID[result.verdict]}"
+    known = result.parameters
+    yield "Model: " + ", ".join(
+        f"{symbol} = {estimate_text(known[name])} {unit}"
+        for name, (symbol, unit) in SHORT.items()
+        if name in known
+    )
     for effect in result.effects:
         units = {n: unit_of(f"{effect.name}.{n}", result.definition) for n in effect.parameters}
+        ci95 = sure_intervals(effect)
         values = ", ".join(
             f"{name} = {value:.4g} {units[name]}".rstrip()
-            + (" [{:.4g}, {:.4g}]".format(*effect.ci95[name]) if name in effect.ci95 else "")
+            + (" [{:.4g}, {:.4g}]".format(*ends) if (ends := ci95.get(name)) else "")
             for name, value in effect.parameters.items()
         )
-        yield (
-            f"  {effect.name}: {values}; closes {100 * effect.closes:.0f} % of the squared gap "
-            f"that the others leave; probability {effect.probability:.3f}, given that the effect "
-            f"is in the library{effect.reserve}"
-        )
+        yield f"  {effect.name}: {values}{effect.reserve}"
         for name, value in effect.elsewhere.items():
             text = f"{name} = {value:.4g} {units[name]}".rstrip()
             yield f"    or {text}, which fits equally well"
@@ -344,6 +348,16 @@ def as_text(result: Discrepancy) -> Iterator[str]:
         )
     yield from _further(result)
     yield from finding_lines(result.data.experiment, *runs)
+    yield NOTE
+
+
+def sure_intervals(effect: NamedEffect) -> dict[str, tuple[float, float] | None]:
+    """Return the 95 % intervals of an effect; None of a phase that may have any value."""
+    phases = {one.name for one in effect.definition.parameters if one.role == "phase"}
+    return {
+        name: None if name in phases and ends[1] - ends[0] >= math.tau else ends
+        for name, ends in effect.ci95.items()
+    }
 
 
 def _between(result: Discrepancy) -> Iterator[str]:

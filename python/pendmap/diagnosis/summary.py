@@ -7,7 +7,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from pendmap.comparison.forecast import AFTER, BEFORE
-from pendmap.diagnosis.result import given_out, ranking
+from pendmap.diagnosis.result import given_out, ranking, sure_intervals
 from pendmap.records.summary import doubts
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def as_json(result: Discrepancy) -> dict[str, Any]:
             {
                 "name": effect.name,
                 "parameters": effect.parameters,
-                "ci95": {name: list(bounds) for name, bounds in effect.ci95.items()},
+                "ci95": sure_intervals(effect),
                 "probability": effect.probability,
                 "approximate": effect.approximate,
                 "closes": effect.closes,
@@ -92,7 +92,7 @@ def as_json(result: Discrepancy) -> dict[str, Any]:
         "set_to_zero": list(result.best.fitted.zeroed),
         "model_file": {"rms": fit.rms, "parameters": given_out(result.best)},
         "parameters": {
-            name: {"value": e.value, "stderr": e.stderr and wider * e.stderr}
+            name: {"value": result.in_turn(name), "stderr": e.stderr and wider * e.stderr}
             for name, e in fit.estimates.items()
         },
         "runs": {

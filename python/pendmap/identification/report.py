@@ -10,6 +10,7 @@ import numpy as np
 
 from pendmap.errors import InputError
 from pendmap.formatting import counted, estimate_text, interval, percent
+from pendmap.identification.engineering import QUANTITIES, lines_of, quantities, swing_amplitude
 from pendmap.identification.methods.trajectory import identification_of
 from pendmap.identification.parameters import OFFSET, SENSOR
 from pendmap.identification.results import FitResult, Followed
@@ -17,6 +18,8 @@ from pendmap.records.summary import doubts, finding_lines
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
+
+    import pandas as pd
 
     from pendmap.formatting import Estimate
     from pendmap.identification.methods.base import Identification
@@ -40,7 +43,7 @@ COLUMNS: Final = {
 }
 """Columns of the table of methods and their headers; effects' parameters follow."""
 
-_SHORT: Final = {"w0": ("w0", "rad/s"), "c_over_m": ("c/m", "1/s"), "Tr": ("Tr", "rad/s^2")}
+SHORT: Final = {"w0": ("w0", "rad/s"), "c_over_m": ("c/m", "1/s"), "Tr": ("Tr", "rad/s^2")}
 """Symbols and units of the parameters that are said first."""
 
 
@@ -100,6 +103,54 @@ class IdentificationReport(FitResult):
     def parameters(self) -> Mapping[str, Estimate]:
         """Parameters of the best method; none if no method gives a model."""
         return {} if self.sound is None else self.sound.parameters
+
+    @property
+    def readings(self) -> pd.DataFrame:
+        """All readings of the fitted runs, one below the other.
+
+        ``time_s`` on the clock of the run, ``reading_rad``, ``fit_rad``, ``residual_rad`` and
+        ``run``; of a sensor on the rod ``reading_rad_per_s`` or so. Fit and residual are nan where
+        a reading is not fitted. InputError is raised without a fit of whole records.
+        """
+        import pandas as pd  # noqa: PLC0415 (where it is needed)
+
+        fit, _, runs = self.followed()
+        parts = []
+        for run, left in zip(runs, fit.residuals, strict=True):
+            gain, unit = 1.0, "rad"
+            if run.rod_sensor is not None:
+                gain, unit = run.rod_sensor.gain, run.rod_sensor.unit.replace("/", "_per_")
+            residual = np.where(run.trusted, gain * left, np.nan)
+            columns = {"reading": run.read, "fit": run.read - residual, "residual": residual}
+            named = {f"{name}_{unit}": values for name, values in columns.items()}
+            parts.append(pd.DataFrame({"time_s": run.time, **named, "run": run.name}))
+        return pd.concat(parts, ignore_index=True)
+
+    @property
+    def largest_swing(self) -> float:
+        """Amplitude of the largest swing of :attr:`run`, rad; pi where it rotates."""
+        size = np.abs(self.peaks.amplitude)
+        if self.joint is not None:
+            size = swing_amplitude(self.joint.fit.curves[0], self.joint.fit["w0"])
+        return min(float(np.nanmax(size)), np.pi) if np.isfinite(size).any() else np.nan
+
+    @property
+    def quantities(self) -> Mapping[str, Estimate]:
+        """Numbers of the trade with errors, by name; those that are not known are left out.
+
+        Of small swings ``frequency_hz = w0 / (2 pi)`` and ``period_s``. Of the viscous damping
+        alone ``zeta = c / (2 m w0)``, ``log_decrement = 2 pi zeta / sqrt(1 - zeta^2)`` and
+        ``time_constant_s = 2 m / c`` of the amplitude. ``Q = 2 pi E / loss`` of a cycle at half of
+        :attr:`largest_swing`, by damping, friction and quadratic drag together. The dead band in
+        which friction holds the pendulum, ``asin(Tr / w0^2)``, as ``dead_band_rad`` and
+        ``dead_band_deg``. ``friction_n_m = J Tr`` and ``viscous_n_m_s = J c / m`` with the moment
+        of inertia ``J`` about the pivot: ``inertia`` of ``[rig]``, kg m^2, or ``m g l / w0^2`` of
+        its ``mass``, kg, and ``length``, m, from the pivot to the centre of mass.
+        """
+        if self.sound is None:
+            return {}
+        known = self.experiment.known, self.experiment.gravity
+        return quantities(self.sound, self.largest_swing / 2, *known)
 
     @property
     def joint_covariance(self) -> Covariance | None:
@@ -208,14 +259,19 @@ def left_out(experiment: Experiment, read: Sequence[Run]) -> str:
 
 def as_json(report: IdentificationReport) -> dict[str, Any]:
     """Return the JSON object of ``pendmap identify``, without the paths of files."""
-    run, best = report.run, report.sound
+    run, best, known = report.run, report.sound, report.quantities
     return {
         "experiment": str(report.experiment.path),
         "run": run.name,
-        "runs": _runs(report),
+        "runs": run_entries(report),
         "noise": report.peaks.sigma,
         "best": None if best is None else best.method,
         "doubts": foremost(report),
+        "quantities": {
+            name: None if one is None else dataclasses.asdict(one)
+            for name, one in ((name, known.get(name)) for name in QUANTITIES)
+        },
+        "q_amplitude_rad": report.largest_swing / 2 if "Q" in known else None,
         "methods": {name: _method(result) for name, result in report.methods.items()},
         "table1": [
             {"what": r.what, "asked": r.asked, "measured": r.measured, "errors_percent": r.errors}
@@ -234,7 +290,7 @@ def as_json(report: IdentificationReport) -> dict[str, Any]:
     }
 
 
-def _runs(report: IdentificationReport) -> list[dict[str, Any]]:
+def run_entries(report: IdentificationReport) -> list[dict[str, Any]]:
     """Return the JSON objects of the runs used; rms and noise are those of the joint fit."""
     entries: list[dict[str, Any]] = []
     for k, run in enumerate(report.runs):
@@ -292,13 +348,14 @@ def in_short(report: IdentificationReport) -> Iterator[str]:
     best = report.sound
     yield from (f"Warning: {text}" for text in foremost(report))
     if best is not None:
-        names = [*_SHORT, *(n for n in best.estimates if n not in (*COLUMNS, *_SHORT))]
+        names = [*SHORT, *(n for n in best.estimates if n not in (*COLUMNS, *SHORT))]
         yield ", ".join(
-            f"{_SHORT.get(name, (name, ''))[0]} = {estimate_text(best.parameters[name])}"
-            f" {_SHORT.get(name, (name, ''))[1]}".rstrip()
+            f"{symbol} = {estimate_text(best.parameters[name])} {unit}".rstrip()
             for name in names
             if name in best.parameters
+            for symbol, unit in [SHORT.get(name, (name, best.unit(name)))]
         )
+        yield from lines_of(report.quantities, report.largest_swing / 2)
         yield f"{best.method}: {best.used}"
     runs_text = left_out(report.experiment, report.runs)
     if runs_text:

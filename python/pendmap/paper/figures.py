@@ -169,7 +169,7 @@ def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
         return render.draw(chart(runs, title, subtitle), path)
     subtitle = f"{_RIG}, release at 3.0 rad, 100 Hz;   4096 counts, noise 0.1°, zero off by 0.05°"
     words = {"title": title, "subtitle": f"{subtitle}, seed {seed}"}
-    return render.draw(identification.sheet(report(seed), parts=(_PARTS[key],), **words), path)
+    return render.draw(identification.whole(report(seed), parts=(_PARTS[key],), **words), path)
 
 
 def _critical() -> xr.Dataset:

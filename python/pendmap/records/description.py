@@ -51,6 +51,9 @@ class Rig:
     length_m: float | None = _key(POSITIVE)
     w0: float | None = _key(POSITIVE)
     encoder_counts: int | None = _key(range(1, 10**9))
+    inertia: float | None = _key(POSITIVE)  # about the pivot, kg m^2
+    mass: float | None = _key(POSITIVE)  # kg
+    length: float | None = _key(POSITIVE)  # of the pivot from the centre of mass, m
 
 
 @dataclasses.dataclass(frozen=True)

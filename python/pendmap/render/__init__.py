@@ -89,7 +89,9 @@ def draw(  # noqa: PLR0913 (all of these a user may choose)
         ``distribution``; a lifetime ``survival``, ``tail``; a diagram ``theta``, ``velocity``,
         ``sweeps``; critical curves ``omega-p``, ``e-alpha2``; a map over parameters ``kinds``,
         ``exponent``, ``attractors``, ``period``, ``winding``, ``undecided``, ``certainty``, ``share
-        KIND``; a sweep ``fraction``, ``entropy``, ``uncertainty``, ``boundary``, ``main``.
+        KIND``; a sweep ``fraction``, ``entropy``, ``uncertainty``, ``boundary``, ``main``; an
+        identification ``record``, ``fit``, ``residual``, ``envelope``, and ``all`` panels of all
+        methods.
     size : (float, float), optional
         Width and height in inches, like ``8x4`` in a command; by default what the parts need.
     width : float, optional

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 
 from pendmap import _core
 from pendmap.diagnosis.advice import DETECTION_PROBABILITY
-from pendmap.diagnosis.result import SAID, as_text, ranking_table, shape_text
+from pendmap.diagnosis.result import SAID, as_text
+from pendmap.diagnosis.table import NOTE
 from pendmap.formatting import Estimate, estimate_text, interval
 from pendmap.identification.report import left_out
 from pendmap.model.labels import unit_of
@@ -47,11 +48,16 @@ def as_markdown(result: Discrepancy, pictures: Mapping[str, str]) -> str:
             name=Path(result.data.experiment.path).resolve().name,
             version=_core.__version__,
             meaning=SAID[result.verdict],
-            lines=[line for line in as_text(result) if not line.startswith("Verdict: ")],
+            lines=[
+                line
+                for line in as_text(result)
+                if not line.startswith("Verdict: ") and line != NOTE
+            ],
+            note=NOTE,
             left_out=left_out(result.data.experiment, result.data.runs),
             unit=functools.partial(unit_of, definition=result.definition),
-            shape=functools.partial(shape_text, result),
-            ranking=ranking_table(result),
+            shape=result.standings.shape_text,
+            ranking=result.table_cells(),
             estimate_text=estimate_text,
             interval=interval,
             number=_number,

@@ -10,6 +10,7 @@ from typing import Final
 
 from pendmap.analysis.result import FLAG
 from pendmap.comparison.experiment import COLUMNS
+from pendmap.identification.engineering import QUANTITIES
 from pendmap.model.labels import LABELS
 
 Keys = dict[str, tuple[str, str]]  # Unit and meaning by path; paths of one meaning have commas
@@ -125,6 +126,12 @@ KEYS: Final[dict[str, Keys]] = {
             f"methods.METHOD.{name}": (LABELS[name].unit or "1", LABELS[name].meaning)
             for name in ("w0", "c_over_m", "zeta", "Tr", "theta_r", "offset")
         },
+        **{
+            f"quantities.{name}.{part}": (unit, f"{text}: {part}")
+            for name, (unit, _, text) in QUANTITIES.items()
+            for part in ("value", "stderr", "ci95[]")
+        },
+        "q_amplitude_rad": ("rad", "amplitude of Q: half of the record's largest swing"),
         "methods.METHOD.EFFECT.NAME": (SI, "parameter of a fitted effect"),
         "methods.METHOD.SENSOR": (SI, "bias or tilt of a sensor on the rod"),
         "methods.METHOD.stderr.PARAMETER": (SI, "standard error of the parameter"),

@@ -8,7 +8,9 @@ order (variation of constants), by
 with the derivatives ``a`` and ``b`` of the angle by the initial angle and velocity. A constant
 torque in one bin of the angle thus has a column of the Jacobian like a parameter, computed with two
 cumulative integrals. Bins of all quantities are fitted jointly, orthogonal to the model's
-parameters and initial states: the result is the torque that the model's own terms cannot represent.
+parameters and initial states. Records hardly determine combinations of bins that are like the
+model's own terms, so the least-squares part of these is taken out of the bins of each quantity: the
+result is the torque that the model's own terms cannot represent.
 Its effect accumulates over a record, so torques far below the noise of second differences are seen.
 """
 
@@ -21,6 +23,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from scipy.fft import dct
 
+from pendmap.identification.engineering import swing_amplitude
+from pendmap.identification.report import DRAG
 from pendmap.identification.sensitivity import window_slopes
 
 if TYPE_CHECKING:
@@ -30,7 +34,7 @@ if TYPE_CHECKING:
     from pendmap.identification.runs import FitRun
     from pendmap.identification.sensitivity import WindowSlopes
     from pendmap.residuals.noise import ResidualNoise
-    from pendmap.signal import Floats
+    from pendmap.signal import Floats, Indices
 
 
 OVER: Final = {
@@ -48,6 +52,7 @@ STANDS_OUT: Final = 4.0  # Standard errors above which a bin is significant; 0.3
 BLIND: Final = 1e-5
 """Information of a combination of bins, over the greatest, below which it is undetermined."""
 LOST: Final = 1e-6  # ``W`` over its greatest below which the integrand is set to 0
+ROUNDING: Final = 1e-9  # Entry of a projector that is 0 but for rounding
 
 
 @dataclasses.dataclass(frozen=True)
@@ -88,17 +93,19 @@ def residual_torque(runs: Sequence[FitRun], fit: TrajectoryFit, noise: ResidualN
     further, residual = project_out(runs, windows, columns)
     rows: dict[str, list[dict[str, Any]]] = {name: [] for name in OVER}
     gains: dict[str, tuple[float, int]] = {}
-    torques, errors, _ = _solved(further, residual)
+    torques, covariance, _ = _solved(further, residual)
     # The noise level is at least the sum of squares over the effective number of readings.
     power = dct(residual - further @ torques, norm="ortho") ** 2
     level = float(np.sum(power**2)) / (3 * float(power.sum())) if power.any() else 0.0
-    errors *= math.sqrt(max(noise.level, level))
-    first = 0
+    covariance *= max(noise.level, level)
+    drag, first = any(effect.name == DRAG for effect in fit.model.effects), 0
     for name, edge in edges.items():
         lows, highs = edge[:-1], edge[1:]
         part = slice(first, first + lows.size)
         gains[name] = _solved(further[:, part], residual)[2]
-        columns_of = (lows, highs, torques[part], errors[part])
+        rest = _without_own(name, edge, places, drag=drag)
+        errors = np.sqrt(np.maximum(np.diag(rest @ covariance[part, part] @ rest), 0.0))
+        columns_of = (lows, highs, rest @ torques[part], errors)
         rows[name] = [
             {
                 "over": name,
@@ -154,13 +161,7 @@ def outstanding_bins(torque: Torque) -> list[dict[str, Any]]:
 def _places(run: FitRun, fit: TrajectoryFit, window: WindowSlopes) -> dict[str, Floats]:
     """Return the quantities of OVER at each sample of a window."""
     part = slice(window.first, window.first + len(window.residual))
-    theta, velocity = (row[part] for row in fit.curves[window.run])
-    energy = 1 - np.cos(theta) + 0.5 * (velocity / fit.model.w0) ** 2
-    amplitude = np.where(
-        energy > 2,  # noqa: PLR2004 (of the inverted pendulum at rest)
-        math.pi * np.sqrt(energy / 2),
-        np.arccos(np.clip(1 - energy, -1, 1)),
-    )
+    theta, velocity = curve = fit.curves[window.run][:, part]
     phase = np.full(theta.shape, math.nan)
     drive = fit.drive_of(run, window.run)
     if drive:
@@ -169,17 +170,47 @@ def _places(run: FitRun, fit: TrajectoryFit, window: WindowSlopes) -> dict[str, 
     return {
         "angle": np.angle(np.exp(1j * theta)),
         "velocity": velocity,
-        "amplitude": amplitude,
+        "amplitude": swing_amplitude(curve, fit.model.w0),
         "drive_phase": phase,
         "lab_time": run.lab_time_s + run.time[part],
     }
+
+
+def _bins(values: Floats, edge: Floats) -> Indices:
+    """Return the number of the bin of each value."""
+    return np.clip(np.searchsorted(edge, values, side="right") - 1, 0, edge.size - 2)
+
+
+def _without_own(
+    name: str, edge: Floats, places: Sequence[dict[str, Floats]], *, drag: bool
+) -> Floats:
+    """Return the projector of a quantity's bins that takes out the model's own terms.
+
+    They are means in the bins: of ``sin`` and ``cos`` over the angle (``w0``, the sensor's zero);
+    of ``v``, ``sign v``, with ``drag`` of ``v |v|``, over the velocity, and along the motion over
+    amplitude and time; a constant over the drive's phase.
+    """
+    place = {key: np.concatenate([one[key] for one in places]) for key in places[0]}
+    known = np.isfinite(place[name])
+    speed, angle = place["velocity"][known], place["angle"][known]
+    terms = [speed, np.sign(speed), *([speed * np.abs(speed)] if drag else [])]
+    if name in ALONG:
+        terms = [np.sign(speed) * term for term in terms]
+    elif name != "velocity":
+        terms = [np.sin(angle), np.cos(angle)] if name == "angle" else [np.ones(speed.size)]
+    which, count = _bins(place[name][known], edge), edge.size - 1
+    number = np.maximum(np.bincount(which, minlength=count), 1)
+    means = np.stack([np.bincount(which, term, count) / number for term in terms], axis=1)
+    means /= np.maximum(np.linalg.norm(means, axis=0), 1e-300)
+    rest = np.eye(count) - means @ np.linalg.pinv(means)
+    return np.where(np.abs(rest) < ROUNDING, 0.0, rest)
 
 
 def _binned(place: dict[str, Floats], edges: dict[str, Floats]) -> Floats:
     """Return a column for each bin with a torque of 1 rad/s^2 in it."""
     torques = []
     for name, edge in edges.items():
-        which = np.clip(np.searchsorted(edge, place[name], side="right") - 1, 0, edge.size - 2)
+        which = _bins(place[name], edge)
         weight = np.sign(place["velocity"]) if name in ALONG else np.ones(which.size)
         weight = np.where(np.isfinite(place[name]), weight, 0.0)
         torques += [np.where(which == k, weight, 0.0) for k in range(edge.size - 1)]
@@ -214,8 +245,8 @@ def responses(run: FitRun, window: WindowSlopes, torques: Floats) -> Floats:
 def _solved(columns: Floats, residual: Floats) -> tuple[Floats, Floats, tuple[float, int]]:
     """Return the least-squares torques of bins, of least norm if they are not unique.
 
-    Further results: their standard errors for a noise level of 1; the decrease of the sum of
-    squares and the number of determined combinations of bins.
+    Further results: their covariance for a noise level of 1; the decrease of the sum of squares and
+    the number of determined combinations of bins.
     """
     gram = columns.T @ columns
     scale = np.sqrt(np.diag(gram))
@@ -226,5 +257,4 @@ def _solved(columns: Floats, residual: Floats) -> tuple[Floats, Floats, tuple[fl
     inverse = (spread @ spread.T) / np.outer(scale, scale)
     pull = columns.T @ residual
     torque = inverse @ pull
-    errors = np.sqrt(np.maximum(np.diag(inverse), 0.0))
-    return torque, errors, (float(pull @ torque), int(np.count_nonzero(known)))
+    return torque, inverse, (float(pull @ torque), int(np.count_nonzero(known)))

@@ -83,13 +83,13 @@ def test_a_viscous_model_lacks_coulomb_friction() -> None:
 
 def test_the_verdict_comes_first() -> None:
     text = str(once("quadratic_drag", seed=3))
-    lines = re.sub(r"\n {4}", " ", text)
-    # Numbers have the units stated in the report.
+    # Numbers have the units stated in the report; the table has what each effect closes.
     assert re.search(
-        r"^  quadratic_drag: q = \S+ 1/rad \[\S+, \S+\]; closes \d+ % of .*; probability 0\.\d+",
-        lines,
-        re.MULTILINE,
+        r"^Model: w0 = \S+ rad/s, c/m = \S+ 1/s, Tr = \S+ rad/s\^2$", text, re.MULTILINE
     )
+    assert re.search(r"^  quadratic_drag: q = \S+ 1/rad \[\S+, \S+\]$", text, re.MULTILINE)
+    row = r"^quadratic_drag +\d+ % +\d+ % +\d+ +0\.\d+ \+- 0\.\d+ 1/rad +0\.\d\d$"
+    assert re.search(row, text, re.MULTILINE)
     assert re.search(r"^Share of the squared gap closed: \d+ %$", text, re.MULTILINE)
     shapes = [line for line in text.splitlines() if " w = " in line]
     assert shapes

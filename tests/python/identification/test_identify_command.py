@@ -11,7 +11,9 @@ import tomllib
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
 import pytest
+from scipy.io import loadmat
 
 import pendmap
 from conftest import COMMAND
@@ -41,10 +43,13 @@ def test_from_a_record_to_its_basins(
     run = pendmap_command("identify", decay_file, "--out", "all.nc", "--out", "model.toml")
     assert run.returncode == 0, run.stderr
     assert run.stdout.rstrip().endswith("Written: model.toml, all.nc")
-    first, second, *_ = run.stdout.splitlines()
+    first, second, third, fourth, *others = re.sub(r"\n +", " ", run.stdout).splitlines()
     pattern = r"w0 = 6\.\d+\(\d+\) rad/s, c/m = 0\.\d+\(\d+\) 1/s, Tr = .* rad/s\^2"
     assert re.fullmatch(pattern, first)
-    assert second.startswith("trajectory: ")
+    assert re.fullmatch(r"f = 0\.98\d+\(\d+\) Hz, period 1\.0\d+\(\d+\) s", second)
+    assert third.startswith("viscous: zeta = ")
+    assert re.match(r"Q = \S+ at 1\.\d+ rad, of all losses, dead band 0\.0\d+\(\d+\) rad", fourth)
+    assert any(line.startswith("trajectory: ") for line in others)
     assert "log_decrement" not in run.stdout
     assert decay_file.read_bytes() == before
     files = sorted(path.name for path in tmp_path.iterdir())
@@ -104,6 +109,29 @@ def test_json_has_every_method(decay_file: Path, pendmap_command: Run, tmp_path:
     assert result["methods"] == json.loads(json.dumps(same))
 
 
+def test_readings_fit_and_residual_are_written_for_other_tools(
+    tmp_path: Path, decay_file: Path, pendmap_command: Run
+) -> None:
+    outs = [word for end in ("csv", "xlsx", "mat") for word in ("--out", f"fit.{end}")]
+    run = pendmap_command("identify", decay_file, "--method", "trajectory", *outs)
+    assert run.returncode == 0, run.stderr
+    tables = [
+        pd.read_csv(tmp_path / "fit.csv"),
+        pd.read_excel(tmp_path / "fit.xlsx", engine="openpyxl"),
+    ]
+    content = loadmat(tmp_path / "fit.mat")
+    names = ["time_s", "reading_rad", "fit_rad", "residual_rad"]
+    for table in tables:
+        assert list(table) == [*names, "run"]
+        assert set(table["run"]) == {"decay"}
+        for name in names:
+            assert table[name].to_numpy() == pytest.approx(content[name].ravel(), abs=1e-12)
+    record, table = pd.read_csv(decay_file), tables[0]
+    assert table["reading_rad"].to_numpy() == pytest.approx(record["theta_rad"].to_numpy())
+    assert np.std(table["residual_rad"]) == pytest.approx(np.radians(0.1), rel=0.05)
+    assert (table["reading_rad"] - table["fit_rad"] - table["residual_rad"]).abs().max() < 1e-12
+
+
 def test_drag_is_tried_where_the_residual_exceeds_the_noise(
     tmp_path: Path, pendmap_command: Run
 ) -> None:
@@ -143,7 +171,7 @@ def test_no_model_is_written_where_the_search_did_not_converge(
         ("identify absent.csv", "absent.csv: No such file"),
         ("identify decay.csv --effect quadratic", "perhaps quadratic_drag"),
         ("identify decay.csv --effect drive_phase", "acts on the drive: it must be"),
-        ("identify decay.csv --out model.csv", "suffix must be .toml or .nc or"),
+        ("identify decay.csv --out model.txt", "suffix must be .toml or .nc or .csv or .xlsx or"),
         ("identify decay.csv --method best", "must be one of trajectory"),
         ("identify forced --method trajectory", "no run is free"),
         ("identify decay.toml --out a.nc --out decay.toml", "'--out': 'decay.toml': is an input"),

@@ -126,11 +126,11 @@ def drawn(chart: Chart | Sheet, **size: Any) -> Figure:  # noqa: ANN401 (as draw
 def test_an_identification_is_drawn_in_any_size_and_by_each_part() -> None:
     report = identified(*record(decay(), seconds=15.0))
     for size in ((4.0, 4.0), (16.0, 12.0)):
-        assert tuple(drawn(identification.sheet(report), size=size).get_size_inches()) == size
+        assert tuple(drawn(identification.whole(report), size=size).get_size_inches()) == size
     for part in identification.PARTS:
-        drawn(identification.sheet(report, parts=(part,), title="Figure", subtitle=""))
+        drawn(identification.whole(report, parts=(part,), title="Figure", subtitle=""))
     with pytest.raises(InputError, match="must be among record, decrement"):
-        identification.sheet(report, parts=("decays",))
+        identification.whole(report, parts=("decays",))
     for shape in (None, (9.0, 5.6), (5.6, 8.0)):
         drawn(pendulum.chart(), size=shape)
 

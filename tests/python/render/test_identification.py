@@ -21,6 +21,7 @@ from pendmap.identification.methods.combined import recursion
 from pendmap.records import Experiment, Run
 
 OFFSET = math.radians(0.05)
+PANELS = ["record", "fit", "residual", "envelope"]
 SIZES = recursion(0.2, 0.004, 0.002, 30)
 SIGN = (-1.0) ** np.arange(30)
 
@@ -80,7 +81,10 @@ def test_the_velocity_of_a_record_with_few_samples_a_half_cycle_is_drawn() -> No
 
 
 def test_only_methods_that_apply_are_drawn_and_the_table_has_their_estimates() -> None:
-    figure = render.figure_of(report(seconds=15.0, offset=0.0))
+    short = report(seconds=15.0, offset=0.0)
+    assert [p.name for p in identification.sheet(short).panels] == PANELS
+    assert not {"log decrement", "energy balance"} & set(named(render.figure_of(short)))
+    figure = render.figure_of(short, layer="all")
     names = named(figure)
     assert "trajectory" in names
     assert not {"log decrement", "combined, as printed"} & set(names)

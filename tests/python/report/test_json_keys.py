@@ -29,7 +29,8 @@ RIG = Rig(w0=6.2, c_over_m=0.3, Tr=0.08)
 DRIVE = 'file = "../forced.csv", kind = "forced", drive = { p = 0.6, Omega = 12.0'
 FORCED = f"{{ {DRIVE} }}, to_s = 50 }}, {{ {DRIVE}, phi = 0.4 }}, from_s = 50 }}"
 FOLDERS = {
-    "lab": f'rig.w0 = 6.2\nrun = [{{ file = "../a.csv" }}, {{ file = "../rest.csv" }}, {FORCED}]',
+    "lab": "rig = { w0 = 6.2, inertia = 1 }\n"
+    f'run = [{{ file = "../a.csv" }}, {{ file = "../rest.csv" }}, {FORCED}]',
     "unlike": 'run = [{ file = "../coarse.csv" }, { file = "../stiff.csv" }]',
     "peaks": 'columns.peaks = "peak_rad"\nrun = [{ file = "../peaks.csv" }]',
     "wrong": """columns.angle = { name = "theta_rad", unit = "V", scale = 1.4 }

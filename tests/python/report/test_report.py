@@ -22,6 +22,7 @@ from pendmap.charts import diagnosis
 from pendmap.diagnosis import Thresholds
 from pendmap.diagnosis.result import as_text
 from pendmap.diagnosis.summary import as_json
+from pendmap.diagnosis.table import NOTE
 from pendmap.formatting import Estimate, estimate_text, interval
 from pendmap.model.labels import unit_of
 from pendmap.render import drawing, style
@@ -107,6 +108,7 @@ def test_each_verdict_has_a_report_of_what_is_printed(verdict: str) -> None:
     first, *lines = [line.strip() for line in as_text(found)]
     meaning = first.removeprefix(f"Verdict: {verdict}: ")
     assert f"**{verdict.capitalize()}**: {meaning}." in markdown
+    assert lines.pop() == NOTE
     assert all(f"- {plain(line)}\n" in markdown for line in lines)
     if verdict == "none":
         # Stretches are held out within one decay; there is no phase of a drive and no comparison.
@@ -116,7 +118,7 @@ def test_each_verdict_has_a_report_of_what_is_printed(verdict: str) -> None:
         assert " ".join(page.words).count(NASTY) >= len(found.data.fitted) + len(found.gap.by_run)
     if verdict == "ambiguous":
         assert "Below 0.02 the residuals are significant." in markdown
-        assert "indistinguishable: behind by less than 12.5, or by one run alone" in markdown
+        assert "Indistinguishable: behind by less than 12.5, or by one run alone" in markdown
         (names,) = found.equivalent
         assert f"- indistinguishable in these records: {', '.join(names)}\n" in markdown
         assert "To distinguish equally good names, record what reveals" in markdown
@@ -145,12 +147,17 @@ def test_the_numbers_of_a_report_are_those_of_the_json() -> None:
         last = [mrad(forecast[key][-1]) for key in ("before", "after")]
         assert by_name[forecast["runs"], ahead][2:4] == last
     (effect,) = fields["effects"]
-    assert f"probability {effect['probability']:.3f}" in text
+    (row,) = (r for r in rows if r[0] == f"`{effect['name']}`" and len(r) == 6)
+    value, half = (float(part) for part in row[4].removesuffix(" 1/rad").split(" +- "))
+    low, high = effect["ci95"]["q"]
+    assert (value - half, value + half) == pytest.approx((low, high), rel=0.01)
+    assert row[2] == f"{100 * effect['closes']:.0f} %"
+    assert row[5] == f"{effect['probability']:.2f}"
     for name, value in found.parameters.items():
         assert by_name[f"`{name}`", unit_of(name)][3:] == [estimate_text(value), interval(value)]
     assert found.parameters["quadratic_drag.q"].value == effect["parameters"]["q"]
-    for row in fields["ranking"][:8]:
-        assert any(r[0] == f"`{row['name']}`" and f"{row['score']:.1f}" in r for r in rows)
+    order = [row["name"] for row in fields["ranking"]]
+    assert {r[0].strip("`") for r in rows if len(r) == 6} - {"effect", "---"} <= set(order)
     for name, limit in fields["detection_limits"].items():
         size = found.definition(name).parameters[0].name
         assert by_name[f"`{name}.{size}`"][1].split()[0] == f"{limit:.2g}"

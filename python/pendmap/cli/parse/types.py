@@ -22,6 +22,7 @@ T = TypeVar("T")
 
 PICTURES = (".png", ".svg", ".pdf")  # Suffixes of figures
 REPORTS = (".html", ".md")  # Suffixes of reports
+TABLES = (".csv", ".xlsx", ".mat")  # Suffixes of tables of readings
 _WITH_PI = re.compile(r"([+-]?)(\d*\.?\d*(?:e[+-]?\d+)?)\*?pi(?:/(\d+\.?\d*))?", re.IGNORECASE)
 
 
@@ -190,6 +191,7 @@ _LIBRARIES = {
     **dict.fromkeys((".png", ".svg", ".pdf", ".html", ".md"), ("pendmap.render", "matplotlib")),
     ".rrd": ("pendmap.viewer", "the extra pendmap[viewer]"),
     ".nc": ("netCDF4", "netcdf4"),
+    ".xlsx": ("openpyxl", "the extra pendmap[excel]"),
     ".zarr": ("zarr", "the extra pendmap[zarr]"),
 }
 """Module that a suffix needs, imported before anything is computed, and its package."""
