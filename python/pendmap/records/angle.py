@@ -7,9 +7,11 @@ import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from numpy.polynomial.legendre import legvander
 
 from pendmap.errors import InputError
 from pendmap.formatting import counted
+from pendmap.records.by_hand import by_hand
 from pendmap.records.noise import noise_of
 from pendmap.records.rod_sensors import FEWEST_PEAKS, PLACE_EXAMPLE, angle_of_rate
 from pendmap.signal.half_cycles import swings
@@ -19,7 +21,7 @@ if TYPE_CHECKING:
     from pendmap.records.experiment import Finding
     from pendmap.records.rod_sensors import Accelerometer
     from pendmap.records.work import Work
-    from pendmap.signal import Floats
+    from pendmap.signal import Floats, Mask
 
 WRAPPED_SPAN: Final = 1.01  # Greatest span of wrapped readings, turns: one turn and some noise
 WRAP_JUMP: Final = 0.75  # Least jump between neighbours that is a wrap, turns
@@ -29,6 +31,9 @@ LEAST_SWING: Final = 5.0  # Least reading of a swing, standard deviations of the
 LARGEST_READING: Final = 1.15  # Greatest reading, over the theoretical maximum: else wrong unit
 ONE_SIDED: Final = 0.15  # Smaller over larger side of the readings below which the axis is radial
 BLIND_SPOT: Final = 0.05  # Relative distance to the centre of oscillation that is refused
+DRIFT_DEGREE: Final = 8  # Degree of the polynomials of time along which a camera drifts
+OFF_CIRCLE: Final = 0.3  # Greatest distance of places from a circle, over their spread, rms
+BLOCKS: Final = 30  # Blocks of a record that give the error of a radius
 RADIUS_DOUBT: Final = 0.02  # Relative standard error of the radius above which it is reported
 
 
@@ -177,44 +182,74 @@ def _circle_angle(work: Work, x: Floats, y: Floats) -> Finding:
     if not size or not math.isfinite(size):
         raise InputError(f"{work.where}: pixel_x and pixel_y must show a swing, they do not move")
     u, v = (x - middle[0]) / size, (y - middle[1]) / size
-    # Initial circle: Kasa's algebraic fit, by least squares of u^2 + v^2.
-    columns = np.column_stack([u, v, np.ones(u.size)])
-    solution = np.linalg.lstsq(columns, u**2 + v**2, rcond=None)[0]
-    a, b = float(solution[0]) / 2, float(solution[1]) / 2
-    radius = math.sqrt(max(float(solution[2]) + a * a + b * b, 1e-12))
-    near = np.ones(u.size, bool)
-    from scipy.optimize import least_squares
-
-    for _ in range(2):
-        inside = u[near], v[near]
-        fit = least_squares(
-            _distances, (a, b, radius), args=inside, method="lm", xtol=1e-14, ftol=1e-14
-        )
-        a, b, radius = fit.x.tolist()
-        rms = math.sqrt(2 * fit.cost / near.sum())
-        error = rms * float(np.linalg.norm(np.linalg.pinv(fit.jac)[2]))
-        away = np.abs(_distances(fit.x, u, v))
-        near = away <= 6 * max(normal_scale(away), 1e-9)
-    if not (math.isfinite(radius) and 0 < radius < 1e3):
+    scaled = 2 * (work.time - work.time[0]) / max(float(np.ptp(work.time)), 1e-12) - 1
+    still, moved = (_circle(u, v, legvander(scaled, degree)) for degree in (0, DRIFT_DEGREE))
+    drifts = u.size * math.log(still.rms / moved.rms) > DRIFT_DEGREE * math.log(u.size)
+    best = moved if drifts and math.isfinite(moved.error) else still
+    spread = math.sqrt(float(np.var(u) + np.var(v)))
+    if not (0 < best.radius < 1e3) or best.rms > OFF_CIRCLE * spread:
+        more = by_hand(work.where, angle=work.columns["pixel_x"], angle_scale=2.5)
         raise InputError(
             f"{work.where}: pixel_x and pixel_y must be positions of a bob on a circle,"
-            " they lie on none"
+            f" they lie on none; small swings .4 from the pivot: {more}"
         )
     speed = np.hypot(np.gradient(u, work.time), np.gradient(v, work.time))
     quick = speed >= np.quantile(speed, 0.8)
-    down = 1.0 if np.median((v - b)[quick]) > 0 else -1.0
-    work.theta = np.unwrap(np.arctan2(u - a, down * (v - b)))
-    centre = middle + size * np.array([a, b])
-    if error > RADIUS_DOUBT * radius:
-        work.note("circle-uncertain", percent=100 * error / radius)
-    way, radius, rms = "down" if down > 0 else "up", radius * size, rms * size
-    x0, y0 = centre
-    return work.finding("angle-from-pixels", x=x0, y=y0, radius=radius, way=way, rms=rms)
+    down = 1.0 if np.median((v - best.y)[quick]) > 0 else -1.0
+    work.theta = np.unwrap(np.arctan2(u - best.x, down * (v - best.y)))
+    radius, error, rms = best.radius * size, best.error * size, best.rms * size
+    if best.error > RADIUS_DOUBT * best.radius:
+        work.note("circle-uncertain", percent=100 * best.error / best.radius)
+    if best is moved:
+        work.note("frame-drifts", way=size * float(np.ptp(best.y)))
+    x0, y0 = middle + size * np.array([best.x, np.mean(best.y)])
+    way = "down" if down > 0 else "up"
+    return work.finding(
+        "angle-from-pixels", x=x0, y=y0, radius=radius, error=error, way=way, rms=rms
+    )
 
 
-def _distances(circle: Floats, u: Floats, v: Floats) -> Floats:
-    """Return the distances of points from a circle (centre and radius), positive outside."""
-    return np.asarray(np.hypot(u - circle[0], v - circle[1]) - circle[2])
+@dataclasses.dataclass(frozen=True)
+class _Circle:
+    """Circle through points, whose centre may move along y; lengths in the unit of the points."""
+
+    x: float
+    y: Floats
+    radius: float
+    error: float  # standard error of the radius, of residuals that may be correlated
+    rms: float  # residual
+
+
+def _circle(u: Floats, v: Floats, basis: Floats) -> _Circle:
+    """Return the circle nearest to points, whose centre moves along y as functions of the time.
+
+    A motion along x is a drift of the zero of the angle, which does not change the radius.
+    """
+    from scipy.optimize import least_squares
+
+    # Initial circle: the algebraic fit, by least squares of u^2 + v^2.
+    algebraic = np.linalg.lstsq(np.column_stack([u, v, basis]), u**2 + v**2, rcond=None)[0]
+    a, b = float(algebraic[0]) / 2, float(algebraic[1]) / 2
+    radius = math.sqrt(max(float(algebraic[2]) + a * a + b * b, 1e-12))
+    start = np.array([radius, a, b, *np.zeros(basis.shape[1] - 1)])
+    near = np.ones(u.size, bool)
+
+    def away(circle: Floats, inside: Mask) -> Floats:
+        height = v[inside] - basis[inside] @ circle[2:]
+        return np.asarray(np.hypot(u[inside] - circle[1], height) - circle[0])
+
+    for _ in range(2):
+        fit = least_squares(away, start, args=(near,), method="lm", xtol=1e-14, ftol=1e-14)
+        start, inside = fit.x, near
+        every = np.abs(away(fit.x, np.ones(u.size, bool)))
+        near = every <= 6 * max(normal_scale(every), 1e-9)
+    # Sums over blocks of the record: neighbouring residuals need not be independent.
+    blocks = np.linspace(0, fit.fun.size, min(BLOCKS, fit.fun.size) + 1).astype(int)[:-1]
+    score = np.add.reduceat(fit.jac * fit.fun[:, None], blocks, axis=0)
+    error = float(np.linalg.norm(score @ np.linalg.pinv(fit.jac.T @ fit.jac)[:, 0]))
+    rms = math.sqrt(2 * fit.cost / max(np.count_nonzero(inside), 1)) or 1e-12
+    radius, x = fit.x[:2].tolist()
+    return _Circle(x, basis @ fit.x[2:], radius, error, rms)
 
 
 def missing(work: Work) -> Finding | None:

@@ -12,18 +12,18 @@ from typing import TYPE_CHECKING, Final, TypeAlias
 from pendmap.errors import InputError, short_repr
 from pendmap.formatting import counted, listed
 from pendmap.records.across import checked_together
-from pendmap.records.channels import channels_of
+from pendmap.records.channels import channels_of, side_by_side
 from pendmap.records.description import NAME, RATES, Description, RunPlan, checked, read_description
 from pendmap.records.experiment import Experiment, Finding, Run, finding_of
 from pendmap.records.rod_sensors import gyroscope_of
 from pendmap.records.rules import OF_RELEASE, RULES, apply
 from pendmap.records.tables import is_frame, read_table, table_of
+from pendmap.records.work import Work
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from pendmap.records.tables import Table
-    from pendmap.records.work import Work
 
     Records: TypeAlias = Experiment | Run | pd.DataFrame | str | os.PathLike[str]
 
@@ -228,9 +228,14 @@ def _runs(
     if plan.file not in tables:
         tables[plan.file] = read_table(path, description.reader)
     table, digest = tables[plan.file]
-    work = channels_of(table, description, plan, str(path))
-    apply(RULES, work)
-    parts, shared = work.split_by_release()
+    named = any(column.name for column in description.columns.values())
+    parts, shared = list[Work](), list[Finding]()
+    for beside in [table] if named else side_by_side(table):
+        work = channels_of(beside, description, plan, str(path))
+        apply(RULES, work)
+        releases, others = work.split_by_release()
+        parts += releases
+        shared += others
     runs = []
     for k, part in enumerate(parts, 1):
         apply(OF_RELEASE, part)
