@@ -34,6 +34,7 @@ BLIND_SPOT: Final = 0.05  # Relative distance to the centre of oscillation that 
 DRIFT_DEGREE: Final = 8  # Degree of the polynomials of time along which a camera drifts
 OFF_CIRCLE: Final = 0.3  # Greatest distance of places from a circle, over their spread, rms
 BLOCKS: Final = 30  # Blocks of a record that give the error of a radius
+MOST_RADIUS_ERROR: Final = 0.3  # Relative standard error of the radius above which it is unknown
 RADIUS_DOUBT: Final = 0.02  # Relative standard error of the radius above which it is reported
 
 
@@ -187,7 +188,8 @@ def _circle_angle(work: Work, x: Floats, y: Floats) -> Finding:
     drifts = u.size * math.log(still.rms / moved.rms) > DRIFT_DEGREE * math.log(u.size)
     best = moved if drifts and math.isfinite(moved.error) else still
     spread = math.sqrt(float(np.var(u) + np.var(v)))
-    if not (0 < best.radius < 1e3) or best.rms > OFF_CIRCLE * spread:
+    certain = best.error < MOST_RADIUS_ERROR * best.radius
+    if not certain or best.rms > OFF_CIRCLE * spread:
         more = by_hand(work.where, angle=work.columns["pixel_x"], angle_scale=2.5)
         raise InputError(
             f"{work.where}: pixel_x and pixel_y must be positions of a bob on a circle,"
@@ -246,7 +248,8 @@ def _circle(u: Floats, v: Floats, basis: Floats) -> _Circle:
     # Sums over blocks of the record: neighbouring residuals need not be independent.
     blocks = np.linspace(0, fit.fun.size, min(BLOCKS, fit.fun.size) + 1).astype(int)[:-1]
     score = np.add.reduceat(fit.jac * fit.fun[:, None], blocks, axis=0)
-    error = float(np.linalg.norm(score @ np.linalg.pinv(fit.jac.T @ fit.jac)[:, 0]))
+    free = blocks.size / max(blocks.size - fit.x.size, 1)
+    error = math.sqrt(free) * float(np.linalg.norm(score @ np.linalg.pinv(fit.jac.T @ fit.jac)[0]))
     rms = math.sqrt(2 * fit.cost / max(np.count_nonzero(inside), 1)) or 1e-12
     radius, x = fit.x[:2].tolist()
     return _Circle(x, basis @ fit.x[2:], radius, error, rms)

@@ -39,6 +39,7 @@ PIVOT_KINDS: Final = ((r"\bacc", "m/s2"), (r"\b(vel|speed)", "m/s"), (r"\b(pos|p
 RISING: Final = 0.9  # Least share of rising steps of a clock
 DECAYED: Final = 0.9  # Greatest spread of a decayed last quarter, over that of the first
 ON_ARC: Final = 0.1  # Greatest distance from a circle, over that from a line, of places on an arc
+COPIED: Final = 0.9999  # Least correlation of the readings of a copy in another unit
 BY_UNIT: Final = 4  # Rank of a heading that fits by its unit alone
 UNNAMED: Final = 9  # Rank of a heading that says nothing
 MOST_UNUSED: Final = 12  # Most unused columns listed in a message
@@ -400,6 +401,8 @@ def side_by_side(table: Table) -> list[Table]:
     kinds = {tuple((heads[k].meaning, heads[k].unit) for k in block) for block in blocks}
     if len(blocks) < 2 or begins[0] or len(kinds) > 1 or len(blocks[0]) < 2:
         return [table]
+    if all(_copied(table.values[:, blocks[0][1]], table.values[:, b[1]]) for b in blocks[1:]):
+        return [table]
     good = [np.isfinite(table.values[:, block[0]]) for block in blocks]
     return [
         dataclasses.replace(
@@ -411,6 +414,14 @@ def side_by_side(table: Table) -> list[Table]:
         )
         for block, rows in zip(blocks, good, strict=True)
     ]
+
+
+def _copied(one: Floats, other: Floats) -> bool:
+    """Return whether two columns have the same readings, up to a factor and a zero."""
+    good = np.isfinite(one) & np.isfinite(other)
+    size = np.std(one[good]) * np.std(other[good])
+    covariance = np.mean((one[good] - np.mean(one[good])) * (other[good] - np.mean(other[good])))
+    return bool(abs(covariance) >= COPIED * size)
 
 
 def head_of(table: Table, place: int) -> str:

@@ -69,7 +69,7 @@ def test_columns_are_read_by_names_and_units(tmp_path: Path, names: str) -> None
 
 @pytest.mark.parametrize(
     ("scale", "names", "says"),
-    [(1.0, "Zeit [min],Winkel [Umdr]", "no column of angles"), (3e9, NAMES, "too large")],
+    [(1.0, "Zeit [min],Winkel [Bq]", "no column of angles: 'Bq' is not known"), (3e9, NAMES, "too large")],
 )
 def test_an_impossible_unit_is_refused(tmp_path: Path, scale: float, names: str, says: str) -> None:
     with pytest.raises(pendmap.InputError, match=says):
