@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from pendmap.records.experiment import Finding
     from pendmap.records.rod_sensors import Accelerometer
     from pendmap.records.work import Work
-    from pendmap.signal import Floats, Mask
+    from pendmap.signal import Floats
 
 WRAPPED_SPAN: Final = 1.01  # Greatest span of wrapped readings, turns: one turn and some noise
 WRAP_JUMP: Final = 0.75  # Least jump between neighbours that is a wrap, turns
@@ -34,7 +34,7 @@ BLIND_SPOT: Final = 0.05  # Relative distance to the centre of oscillation that 
 DRIFT_DEGREE: Final = 8  # Degree of the polynomials of time along which a camera drifts
 OFF_CIRCLE: Final = 0.3  # Greatest distance of places from a circle, over their spread, rms
 BLOCKS: Final = 30  # Blocks of a record that give the error of a radius
-MOST_RADIUS_ERROR: Final = 0.3  # Relative standard error of the radius above which it is unknown
+MOST_RADIUS_ERROR: Final = 0.5  # Relative standard error of the radius above which it is unknown
 RADIUS_DOUBT: Final = 0.02  # Relative standard error of the radius above which it is reported
 
 
@@ -185,11 +185,10 @@ def _circle_angle(work: Work, x: Floats, y: Floats) -> Finding:
     u, v = (x - middle[0]) / size, (y - middle[1]) / size
     scaled = 2 * (work.time - work.time[0]) / max(float(np.ptp(work.time)), 1e-12) - 1
     still, moved = (_circle(u, v, legvander(scaled, degree)) for degree in (0, DRIFT_DEGREE))
-    drifts = u.size * math.log(still.rms / moved.rms) > DRIFT_DEGREE * math.log(u.size)
-    best = moved if drifts and math.isfinite(moved.error) else still
+    drifts = u.size * math.log(still[3] / moved[3]) > DRIFT_DEGREE * math.log(u.size)
+    (radius, a), b, error, rms = moved if drifts else still
     spread = math.sqrt(float(np.var(u) + np.var(v)))
-    certain = best.error < MOST_RADIUS_ERROR * best.radius
-    if not certain or best.rms > OFF_CIRCLE * spread:
+    if not error < MOST_RADIUS_ERROR * radius or rms > OFF_CIRCLE * spread:
         more = by_hand(work.where, angle=work.columns["pixel_x"], angle_scale=2.5)
         raise InputError(
             f"{work.where}: pixel_x and pixel_y must be positions of a bob on a circle,"
@@ -197,35 +196,22 @@ def _circle_angle(work: Work, x: Floats, y: Floats) -> Finding:
         )
     speed = np.hypot(np.gradient(u, work.time), np.gradient(v, work.time))
     quick = speed >= np.quantile(speed, 0.8)
-    down = 1.0 if np.median((v - best.y)[quick]) > 0 else -1.0
-    work.theta = np.unwrap(np.arctan2(u - best.x, down * (v - best.y)))
-    radius, error, rms = best.radius * size, best.error * size, best.rms * size
-    if best.error > RADIUS_DOUBT * best.radius:
-        work.note("circle-uncertain", percent=100 * best.error / best.radius)
-    if best is moved:
-        work.note("frame-drifts", way=size * float(np.ptp(best.y)))
-    x0, y0 = middle + size * np.array([best.x, np.mean(best.y)])
-    way = "down" if down > 0 else "up"
-    return work.finding(
-        "angle-from-pixels", x=x0, y=y0, radius=radius, error=error, way=way, rms=rms
-    )
+    down = 1.0 if np.median((v - b)[quick]) > 0 else -1.0
+    work.theta = np.unwrap(np.arctan2(u - a, down * (v - b)))
+    if error > RADIUS_DOUBT * radius:
+        work.note("circle-uncertain", percent=100 * error / radius)
+    if drifts:
+        work.note("frame-drifts", way=size * float(np.ptp(b)))
+    x0, y0 = middle + size * np.array([a, np.mean(b)])
+    sizes = {"radius": radius * size, "error": error * size, "rms": rms * size}
+    return work.finding("angle-from-pixels", x=x0, y=y0, way="down" if down > 0 else "up", **sizes)
 
 
-@dataclasses.dataclass(frozen=True)
-class _Circle:
-    """Circle through points, whose centre may move along y; lengths in the unit of the points."""
+def _circle(u: Floats, v: Floats, basis: Floats) -> tuple[Floats, Floats, float, float]:
+    """Return the circle nearest to points, whose centre moves along v as functions of the time.
 
-    x: float
-    y: Floats
-    radius: float
-    error: float  # standard error of the radius, of residuals that may be correlated
-    rms: float  # residual
-
-
-def _circle(u: Floats, v: Floats, basis: Floats) -> _Circle:
-    """Return the circle nearest to points, whose centre moves along y as functions of the time.
-
-    A motion along x is a drift of the zero of the angle, which does not change the radius.
+    They are the radius and u of the centre, its v, the standard error of the radius, and the
+    residual. A motion along u is a drift of the zero, which does not change the radius.
     """
     from scipy.optimize import least_squares
 
@@ -233,26 +219,31 @@ def _circle(u: Floats, v: Floats, basis: Floats) -> _Circle:
     algebraic = np.linalg.lstsq(np.column_stack([u, v, basis]), u**2 + v**2, rcond=None)[0]
     a, b = float(algebraic[0]) / 2, float(algebraic[1]) / 2
     radius = math.sqrt(max(float(algebraic[2]) + a * a + b * b, 1e-12))
-    start = np.array([radius, a, b, *np.zeros(basis.shape[1] - 1)])
+    circle = np.array([radius, a, b, *np.zeros(basis.shape[1] - 1)])
     near = np.ones(u.size, bool)
 
-    def away(circle: Floats, inside: Mask) -> Floats:
-        height = v[inside] - basis[inside] @ circle[2:]
-        return np.asarray(np.hypot(u[inside] - circle[1], height) - circle[0])
+    def away(circle: Floats) -> Floats:
+        return np.asarray(np.hypot(u - circle[1], v - basis @ circle[2:]) - circle[0])
 
     for _ in range(2):
-        fit = least_squares(away, start, args=(near,), method="lm", xtol=1e-14, ftol=1e-14)
-        start, inside = fit.x, near
-        every = np.abs(away(fit.x, np.ones(u.size, bool)))
+        inside = near
+        fit = least_squares(
+            lambda circle, used: away(circle)[used],
+            circle,
+            args=(inside,),
+            method="lm",
+            xtol=1e-14,
+            ftol=1e-14,
+        )
+        circle, every = fit.x, np.abs(away(fit.x))
         near = every <= 6 * max(normal_scale(every), 1e-9)
     # Sums over blocks of the record: neighbouring residuals need not be independent.
     blocks = np.linspace(0, fit.fun.size, min(BLOCKS, fit.fun.size) + 1).astype(int)[:-1]
     score = np.add.reduceat(fit.jac * fit.fun[:, None], blocks, axis=0)
-    free = blocks.size / max(blocks.size - fit.x.size, 1)
+    free = blocks.size / max(blocks.size - circle.size, 1)
     error = math.sqrt(free) * float(np.linalg.norm(score @ np.linalg.pinv(fit.jac.T @ fit.jac)[0]))
     rms = math.sqrt(2 * fit.cost / max(np.count_nonzero(inside), 1)) or 1e-12
-    radius, x = fit.x[:2].tolist()
-    return _Circle(x, basis @ fit.x[2:], radius, error, rms)
+    return circle[:2], basis @ circle[2:], error, rms
 
 
 def missing(work: Work) -> Finding | None:

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
 import difflib
-import itertools
-import math
 import re
 from typing import TYPE_CHECKING, Final
 
@@ -17,8 +14,19 @@ from pendmap.model.quantities import GRAVITY
 from pendmap.records.by_hand import by_hand
 from pendmap.records.description import Column
 from pendmap.records.experiment import finding_of
+from pendmap.records.guesses import ANGLE_CHANNELS, changes, guess, head_of, use_pixels
 from pendmap.records.rod_sensors import accelerometer_of
-from pendmap.records.units import ANGLES, CHANNELS, LENGTHS, PIVOT_UNITS, RAW, Heading, name_and_unit, plain, spelling
+from pendmap.records.units import (
+    ANGLES,
+    CHANNELS,
+    LENGTHS,
+    PIVOT_UNITS,
+    RAW,
+    Heading,
+    name_and_unit,
+    plain,
+    spelling,
+)
 from pendmap.records.work import Work
 
 if TYPE_CHECKING:
@@ -30,18 +38,9 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats
 
 _MOST_NAMED: Final = 8  # Most columns listed in a message
-# Channels from which an angle can be computed
-ANGLE_CHANNELS: Final = ("angle", "velocity", "pixel_x", "pixel_y", "acceleration", "peaks")
-POSITION_AGREES: Final = 0.9  # Least correlation of a position with the integrated velocity
 MOTOR_UNITS: Final = ("nm", "mnm", "a", "ma")
 # Default unit of a pivot's column by words in its name
 PIVOT_KINDS: Final = ((r"\bacc", "m/s2"), (r"\b(vel|speed)", "m/s"), (r"\b(pos|place|x)", "m"))
-RISING: Final = 0.9  # Least share of rising steps of a clock
-DECAYED: Final = 0.9  # Greatest spread of a decayed last quarter, over that of the first
-ON_ARC: Final = 0.1  # Greatest distance from a circle, over that from a line, of places on an arc
-COPIED: Final = 0.9999  # Least correlation of the readings of a copy in another unit
-BY_UNIT: Final = 4  # Rank of a heading that fits by its unit alone
-UNNAMED: Final = 9  # Rank of a heading that says nothing
 MOST_UNUSED: Final = 12  # Most unused columns listed in a message
 
 
@@ -65,7 +64,7 @@ def channels_of(  # noqa: C901 (a step each)
             places[channel] = place
     rate, known = description.rate_hz, description.known
     findings = use_pixels(table, places, asked)
-    findings += guess(table, places, where, timed=rate is None)
+    findings += guess(table, places, timed=rate is None)
     values, heads = {}, {}
     if rate and "time" not in places:
         values["time"], heads["time"] = table.order / rate, f"{rate:g} readings a second"
@@ -154,19 +153,18 @@ def _check(places: dict[str, int], table: Table, where: str, *, timed: bool) -> 
 def _missing_angle(table: Table, places: Mapping[str, int], where: str) -> str:
     """Return what is no angle in a table, and the command that reads it all the same."""
     free = [k for k in range(len(table.names)) if k not in places.values()]
-    for k in free:
-        head = Heading.of(table.names[k])
+    for k, head in ((k, Heading.of(table.names[k])) for k in free):
         unit = spelling(head.unit or "px")
         if unit in LENGTHS and (head.unit or head.meaning in {"x", "y"}):
             length = 400 if unit == "px" else 0.4 / LENGTHS[unit]
+            more = by_hand(where, angle=k + 1, angle_scale=f"{1 / length:.4g}")
             return (
-                f"{table.names[k]!r} is a length: x and y of the bob must be given, or the distance"
-                f" from the pivot, here of {length:g} {head.unit or 'in the unit of the column'}, as"
-                f" {by_hand(where, angle=k + 1, angle_scale=f'{1 / length:.4g}')}"
+                f"{table.names[k]!r} is a length: x and y must be given, or the distance from the"
+                f" pivot, as here of {length:g} {head.unit or 'px'}: {more}"
             )
         if head.unit is not None and {"angle", "velocity"} & {*head.meanings}:
             more = by_hand(where, angle=k + 1, angle_unit="deg")
-            return f"{head.unit!r} is not known as a unit of it, of {table.names[k]!r}: {more}"
+            return f"{head.unit!r} is not known as a unit of {table.names[k]!r}: {more}"
     more = by_hand(where, angle=free[-1] + 1 if free else 2)
     return f"there must be theta_rad or one like it; there are {_names(table)}: {more} takes one"
 
@@ -183,13 +181,9 @@ def _in_si(  # noqa: PLR0913, PLR0917 (what is known of the column)
     if counts and spelling(unit) == "counts":
         return (raw - column.zero) * 2 * np.pi / counts
     if spelling(unit) in RAW and channel in {"angle", "velocity"} and column.unit is None:
-        path = where.removesuffix(f": {channel}")
-        more = {"counts_per_turn": 2400} if spelling(unit) == "counts" else {"angle_scale": 1.2}
-        what = "the counts of a turn" if spelling(unit) == "counts" else "the rad of one unit"
-        raise InputError(
-            f"{where}: {head!r} has no unit of an angle: {what} must be given, like"
-            f" {by_hand(path, **more)}"
-        )
+        name, value = ("counts_per_turn", 2400) if "count" in spelling(unit) else ("angle_scale", 1)
+        more = by_hand(where.removesuffix(f": {channel}"), **{name: value})
+        raise InputError(f"{where}: the scale of {head!r} must be given, like {more}")
     return (raw - column.zero) * CHANNELS[channel].factor(unit, where)
 
 
@@ -205,234 +199,6 @@ def _pivot(
     places = {k: _place(v, table, f"{where}: pivot: {k}") for k, v in names.items() if v}
     motion = {way: table.values[:, place] * factor for way, place in places.items()}
     return motion, unit, list(places.values())
-
-
-def use_pixels(table: Table, places: dict[str, int], asked: Mapping[str, Column]) -> list[Finding]:
-    """Assign the pixel coordinates of a table whose angle column is constant."""
-    guessed, _ = _by_name(table, {k: v for k, v in places.items() if k != "angle"}, timed=False)
-    place = places.get("angle", guessed.get("angle"))
-    both = guessed | places
-    pair: dict[str, int] = {c: both[c] for c in ("pixel_x", "pixel_y") if c in both}
-    if place is None or "angle" in asked or len(pair) < 2:
-        return []
-    if changes(table.values[:, place]) or not changes(table.values[:, pair["pixel_x"]]):
-        return []
-    places.pop("angle", None)
-    places.update(pair)
-    x, y = (table.names[k] for k in pair.values())
-    return [finding_of("angle-constant", angle=head_of(table, place), x=x, y=y)]
-
-
-def guess(table: Table, places: dict[str, int], where: str, *, timed: bool) -> list[Finding]:
-    """Assign missing channels by the words and units of headings, or by position without names."""
-    if not any(table.names):
-        return _by_position(table, places, where, timed=timed)
-    guessed, rivals = _by_name(table, places, timed=timed)
-    if "time" in places and any(channel in places for channel in ANGLE_CHANNELS):
-        guessed = {c: k for c, k in guessed.items() if c in {"velocity", "trigger"}}
-    # An angle given with pixel coordinates was computed from them.
-    pair = all(name in places or name in guessed for name in ("pixel_x", "pixel_y"))
-    if "angle" in places or "angle" in guessed or not pair:
-        guessed = {c: k for c, k in guessed.items() if not c.startswith("pixel")}
-    if "pixel_x" in places:
-        guessed.pop("angle", None)
-    if not {"angle", "pixel_x", "peaks"} & {*places, *guessed}:
-        position = position_of(table, places | guessed)
-        guessed |= {} if position is None else {"angle": position}
-    if not any(channel in places or channel in guessed for channel in ANGLE_CHANNELS):
-        rivals = _others(table, places | guessed, timed=timed)
-        guessed |= {"angle": _swinging(table, rivals)} if rivals else {}
-    places.update(guessed)
-    names = ", ".join(f"{channel} is {table.names[k]!r}" for channel, k in guessed.items())
-    findings = [finding_of("columns-guessed", names=names)] if guessed else []
-    return findings + (_rivalry(table, guessed["angle"], rivals, where) if "angle" in guessed else [])
-
-
-def _by_name(
-    table: Table, places: dict[str, int], *, timed: bool
-) -> tuple[dict[str, int], list[int]]:
-    """Return columns whose headings fit channels without; all that fit the angle equally well."""
-    guessed: dict[str, int] = {}
-    rivals: list[int] = []
-    heads = [Heading.of(name) for name in table.names]
-    for channel in CHANNELS:
-        taken = {*places.values(), *guessed.values()}
-        free = [k for k in range(len(heads)) if k not in taken and channel not in places]
-        ranks = {k: rank for k in free if (rank := heads[k].rank(channel)) is not None}
-        if channel == "time":
-            weak = [k for k in free if ranks.get(k, UNNAMED) >= BY_UNIT]
-            weak = [k for k in weak if k in ranks or (timed and _nameless(heads[k], "x"))]
-            ranks |= dict.fromkeys(weak, UNNAMED)
-            ranks = {k: r for k, r in ranks.items() if k not in weak or rises(table.values[:, k])}
-        moving = [k for k in ranks if changes(table.values[:, k])] or [*ranks]
-        best = [k for k in moving if ranks[k] == min(ranks[m] for m in moving)]
-        if not best:
-            continue
-        columns = table.values[:, best]
-        spread = np.std(np.where(np.isfinite(columns), columns, 0.0), axis=0)
-        axes = channel in {"velocity", "acceleration"}
-        guessed[channel] = best[int(np.argmax(spread)) if axes else 0]
-        if channel == "angle":
-            guessed[channel], rivals = _swinging(table, best, widest=True), best
-    rate = heads[guessed["velocity"]].rank("velocity") if "velocity" in guessed else None
-    if "angle" in guessed and rate is not None and rate < BY_UNIT:
-        rank = heads[guessed["angle"]].rank("angle")
-        if rank is not None and rank > BY_UNIT:  # volts, or a motor's angle, beside a gyroscope
-            del guessed["angle"]
-    return guessed, rivals
-
-
-def _nameless(head: Heading, *letters: str) -> bool:
-    """Return whether a heading says nothing, as "value 1" or some letters."""
-    return head.unit is None and head.meaning in {"", "plain", "smooth", *letters}
-
-
-def _others(table: Table, places: Mapping[str, int], *, timed: bool) -> list[int]:
-    """Return the columns of which one may be the angle where no heading says so."""
-    free = [k for k in range(table.values.shape[1]) if k not in places.values()]
-    if not timed and len(free) == 1:
-        return free
-    # Beside a column "X" of times "Y" is no place.
-    clock = table.names[places["time"]] if "time" in places else ""
-    letters = "xy" if Heading.of(clock).meaning == "x" else ""
-    free = [k for k in free if _nameless(Heading.of(table.names[k]), *letters)]
-    free = [k for k in free if changes(table.values[:, k])]
-    return free if len(free) == 1 or any(decays(table.values[:, k]) for k in free) else []
-
-
-def _swinging(table: Table, columns: list[int], *, widest: bool = False) -> int:
-    """Return the first column that decays, which a drive does not; of axes one that swings widely."""
-    columns = [k for k in columns if decays(table.values[:, k])] or columns
-    if not widest or len(columns) == 1:
-        return columns[0]
-    factors = [ANGLES.get(spelling(Heading.of(table.names[k]).unit or ""), 1.0) for k in columns]
-    spreads = np.nanstd(table.values[:, columns], axis=0) * factors
-    return columns[int(np.argmax(2 * spreads >= spreads.max()))]
-
-
-def decays(values: Floats) -> bool:
-    """Return whether the spread of a column falls by a tenth from its first to its last quarter."""
-    first, *_, last = np.array_split(values[np.isfinite(values)], 4)
-    return bool(last.size) and float(np.std(last)) < DECAYED * float(np.std(first))
-
-
-def _rivalry(table: Table, place: int, rivals: list[int], where: str) -> list[Finding]:
-    """Return the finding that other columns may be the angle, too."""
-    others = [k for k in rivals if k != place]
-    if not others:
-        return []
-    heads = listed([repr(head_of(table, k)) for k in others], MOST_UNUSED)
-    more = by_hand(where, angle=others[0] + 1)
-    return [finding_of("angle-chosen", head=head_of(table, place), others=heads, more=more)]
-
-
-def rises(values: Floats) -> bool:
-    """Return whether a column rises nearly always, and not by 1 each time as a counter does."""
-    steps = np.diff(values)
-    steps = steps[np.isfinite(steps)]
-    return bool(np.sum(steps > 0) > RISING * steps.size and np.any(steps != 1))
-
-
-def _by_position(
-    table: Table, places: dict[str, int], where: str, *, timed: bool
-) -> list[Finding]:
-    """Assign time and angle, or time and places on a circle, in a table without headings."""
-    free = [k for k in range(table.values.shape[1]) if k not in places.values()]
-    guesses: list[str] = []
-    rivals: list[int] = []
-    if not timed:  # the rate is known: ignore columns that number the readings
-        free = [k for k in free if np.any(np.diff(table.values[:, k]) != 1)]
-    if "time" not in places and free:
-        steps = np.diff(table.values[:, free], axis=0)
-        up = np.sum(steps > 0, axis=0) > RISING * np.sum(np.isfinite(steps), axis=0)
-        if up.any():
-            clocks = [k for k in free if rises(table.values[:, k])] or [free[int(np.argmax(up))]]
-            k = places["time"] = clocks[0]
-            free.remove(k)
-            guesses.append(f"column {k + 1} is the time in s")
-    free = [k for k in free if changes(table.values[:, k])] or free
-    if free and not any(channel in places for channel in ANGLE_CHANNELS):
-        if len(free) > 1 and on_circle(*table.values[:, free[:2]].T):
-            places |= {"pixel_x": free[0], "pixel_y": free[1]}
-            guesses.append(f"columns {free[0] + 1} and {free[1] + 1} are places x and y on a circle")
-        else:
-            places["angle"], rivals = _swinging(table, free), free
-            guesses.append(f"column {places['angle'] + 1} is the angle")
-    finding = finding_of("columns-guessed.places", names=", ".join(guesses))
-    findings = [finding] if guesses else []
-    return findings + (_rivalry(table, places["angle"], rivals, where) if rivals else [])
-
-
-def on_circle(x: Floats, y: Floats) -> bool:
-    """Return whether places lie on an arc: ten times nearer to a circle than to a line."""
-    good = np.isfinite(x) & np.isfinite(y)
-    u, v = x[good] - np.mean(x[good]), y[good] - np.mean(y[good])
-    line = float(np.linalg.svd(np.column_stack([u, v]), compute_uv=False)[-1])
-    columns = np.column_stack([u, v, np.ones(u.size)])
-    a, b, c = np.linalg.lstsq(columns, u**2 + v**2, rcond=None)[0].tolist()
-    away = np.hypot(u - a / 2, v - b / 2) - math.sqrt(c + a * a / 4 + b * b / 4)
-    turns = np.unwrap(np.arctan2(v - b / 2, u - a / 2))  # of a phase plane
-    return float(np.linalg.norm(away)) < ON_ARC * line and float(np.ptp(turns)) < math.tau
-
-
-def position_of(table: Table, places: Mapping[str, int]) -> int | None:
-    """Return the column named position, unless it contradicts a velocity; else None."""
-    from scipy.signal import detrend
-
-    heads = {k: Heading.of(head) for k, head in enumerate(table.names) if k not in places.values()}
-    fitting = [k for k, head in heads.items() if head.meaning == "position"]
-    fitting = [k for k in fitting if heads[k].unit is None or heads[k].rank("angle") is not None]
-    if len(fitting) != 1 or "velocity" not in places:
-        return fitting[0] if len(fitting) == 1 else None
-    both = table.values[:, [fitting[0], places["velocity"]]]
-    both = both[np.isfinite(both).all(axis=1)]
-    if both.shape[0] < 5:
-        return None
-    one, other = detrend(both[:, 0]), detrend(np.cumsum(both[:, 1]))
-    size = float(np.linalg.norm(one) * np.linalg.norm(other))
-    return fitting[0] if size > 0 and float(one @ other) > POSITION_AGREES * size else None
-
-
-def side_by_side(table: Table) -> list[Table]:
-    """Return the tables of runs beside each other, whose columns begin with times each and agree."""
-    heads = [Heading.of(name) for name in table.names]
-    begins = [k for k, head in enumerate(heads) if head.meaning == "time"]
-    blocks = [range(a, b) for a, b in itertools.pairwise([*begins, len(heads)])]
-    kinds = {tuple((heads[k].meaning, heads[k].unit) for k in block) for block in blocks}
-    if len(blocks) < 2 or begins[0] or len(kinds) > 1 or len(blocks[0]) < 2:
-        return [table]
-    if all(_copied(table.values[:, blocks[0][1]], table.values[:, b[1]]) for b in blocks[1:]):
-        return [table]
-    good = [np.isfinite(table.values[:, block[0]]) for block in blocks]
-    return [
-        dataclasses.replace(
-            table,
-            names=tuple(table.names[k] for k in block),
-            values=table.values[rows][:, list(block)],
-            rows=table.rows[rows],
-            order=table.order[rows],
-        )
-        for block, rows in zip(blocks, good, strict=True)
-    ]
-
-
-def _copied(one: Floats, other: Floats) -> bool:
-    """Return whether two columns have the same readings, up to a factor and a zero."""
-    good = np.isfinite(one) & np.isfinite(other)
-    size = np.std(one[good]) * np.std(other[good])
-    covariance = np.mean((one[good] - np.mean(one[good])) * (other[good] - np.mean(other[good])))
-    return bool(abs(covariance) >= COPIED * size)
-
-
-def head_of(table: Table, place: int) -> str:
-    """Return the heading of a column."""
-    return table.names[place] or f"column {place + 1}"
-
-
-def changes(values: Floats) -> bool:
-    """Return whether a column has at least two different values."""
-    seen = values[np.isfinite(values)]
-    return bool(seen.size) and float(np.ptp(seen)) > 0
 
 
 def _unused(

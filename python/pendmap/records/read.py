@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Final, TypeAlias
 from pendmap.errors import InputError, short_repr
 from pendmap.formatting import counted, listed
 from pendmap.records.across import checked_together
-from pendmap.records.channels import channels_of, side_by_side
+from pendmap.records.channels import channels_of
 from pendmap.records.description import NAME, RATES, Description, RunPlan, checked, read_description
 from pendmap.records.experiment import Experiment, Finding, Run, finding_of
+from pendmap.records.guesses import side_by_side
 from pendmap.records.rod_sensors import gyroscope_of
 from pendmap.records.rules import OF_RELEASE, RULES, apply
 from pendmap.records.tables import is_frame, read_table, table_of

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats, Indices
 
 FEWEST_PERIODS: Final = 6  # Fewest periods that are analysed
+LEAST_GROWTH: Final = 1e-4  # Growth of the period, over a pendulum's, of readings that show none
 ONE_SIDED: Final = 0.1  # Greatest decay of one side, over that of the other, of what is no angle
 GAIN_KNOWN: Final = 0.1  # Half-width of the gain's 95 % interval above which it is reported
 LARGEST_SWING: Final = 3.0  # Largest amplitude, rad, at which the increase of the period is used
@@ -123,7 +124,7 @@ def gain_interval(periods: Periods) -> tuple[float, float]:
     least, most = share - Z95 * error, share + Z95 * error
     # Of wide swings the growth is more than the square of the angle.
     wide = factor_of(periods, share)[0] / math.sqrt(share) if share > 3 * error else 1.0
-    low = 1 / (wide * math.sqrt(most)) if most > 0 else 0.0
+    low = 1 / (wide * math.sqrt(max(most, LEAST_GROWTH)))
     return low, 1 / (wide * math.sqrt(least)) if least > 0 else math.inf
 
 
@@ -138,7 +139,7 @@ def middle_of(time: Floats, theta: Floats) -> float | None:
 
 def factor_of(periods: Periods, share: float) -> tuple[float, float]:
     """Return the factor on the readings that gives a pendulum's periods, and its error."""
-    best, error = math.sqrt(max(share, 1e-4)), 0.0
+    best, error = math.sqrt(max(share, LEAST_GROWTH)), 0.0
     for _ in range(12):  # Gauss-Newton steps
         grown = growth(best * periods.amplitude)
         slope = (growth(1.001 * best * periods.amplitude) - grown) / (0.001 * best)

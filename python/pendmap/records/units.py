@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import itertools
 import re
 import tomllib
 import unicodedata
@@ -52,14 +51,17 @@ def _spellings() -> Iterator[tuple[str, str]]:
         yield from ((word, name) for word in (name.lower(), *words.split()))
 
 
-_UNITS: Final = dict(_spellings())
+_UNITS: Final[dict[str, str]] = dict(_spellings())
 # Meanings in the order in which they decide about a heading
 MEANINGS: Final = tuple(_TABLES["words"])
 # Meanings of columns that are not the pendulum's
 OTHERS: Final = ("drive", "motor", "pivot", "error")
-_WORDS: Final = {word: name for name, words in _TABLES["words"].items() for word in words.split()}
+_WORDS: Final[dict[str, str]] = {
+    word: name for name, words in _TABLES["words"].items() for word in words.split()
+}
 _ENDINGS: Final = ("", "s", "es", "n", "en")  # of plurals
 _FIRM: Final = ("velocity", "acceleration", "trigger")  # Meanings that no unit contradicts
+_FURTHER: Final = ("plain", "pendulum", "smooth")  # Meanings of words that follow a unit
 _SHORTEST_STEM: Final = 3
 _SHORTEST_PART: Final = 4  # Shortest part of a compound, letters, but for Chinese
 _SIGNS: Final = str.maketrans("˚º∘ł（）［］【】：´’′`μµ−⋅·*", "°°°l()[][]:''''uu-...")
@@ -68,6 +70,7 @@ _DERIVATIVES: Final = (
     (r"\bd\^?2\s*\(?([^\W\d_]+)\)?\s*/\s*d\s*t\s*\^?2", r"\1 ddot"),
     (r"\bd\s*\(?([^\W\d_]+)\)?\s*/\s*d\s*t\b", r"\1 dot"),
     (r"([α-ω]|theta|phi)'", r"\1 dot"),
+    (r"\(\s*t\s*\)", " "),
 )
 _BRACKETS: Final = re.compile(r"\s*/?\s*[\(\[\{]([^()\[\]{}]*)[\)\]\}]")
 _CAMEL: Final = r"(?<=[a-z])(?=[A-Z])"
@@ -178,6 +181,20 @@ def _is_unit(text: str) -> bool:
     return text != "1" and any(channel.has(text) for channel in CHANNELS.values())
 
 
+def _splits(text: str) -> Iterator[tuple[str, str]]:
+    """Yield a heading divided into a name and what may be its unit, the likeliest first."""
+    for match in _BRACKETS.finditer(text):
+        yield text[: match.start()] + text[match.end() :], match[1]
+    yield text, text if len(text) > 1 else ""
+    yield from ((text[: gap.start()], text[gap.end() :]) for gap in _BREAKS.finditer(text, 1))
+    first, *rest = plain(text).split() or [""]
+    if len(first) > 1 and rest and {*meanings_of(rest)} <= {"time", "plain"}:
+        yield text, first if spelling(first) in TIMES else ""  # "seconds_elapsed"
+    last = _LAST.fullmatch(text)
+    if last and last[1] and (last[2].isdigit() or meaning_of(last[2].lower()) in _FURTHER):
+        yield from ((f"{name} {last[2]}", unit) for name, unit in _splits(last[1]))
+
+
 @functools.cache
 def name_and_unit(header: str) -> tuple[str, str | None]:
     """Return name and unit of a heading; None without a unit.
@@ -188,31 +205,12 @@ def name_and_unit(header: str) -> tuple[str, str | None]:
     text = header.translate(_SIGNS).strip()
     if ":" in text and not _is_unit(text.rpartition(":")[2]):
         text = text.rpartition(":")[2].strip() or text  # "Run 1: Time (s)"
-    brackets = list(_BRACKETS.finditer(text))
-    for match in brackets:
-        if _is_unit(match[1]):
-            return (text[: match.start()] + text[match.end() :]).strip(), match[1].strip()
-    if len(text) > 1 and _is_unit(text):
-        return text, text
-    for gap in _BREAKS.finditer(text):
-        if gap.start() and _is_unit(text[gap.end() :]):
-            return text[: gap.start()], text[gap.end() :].strip()
-    first, *rest = plain(text).split() or [""]
-    if len(first) > 1 and rest and spelling(first) in TIMES:  # "seconds_elapsed"
-        if {*meanings_of(rest)} <= {"time", "plain"}:
-            return text, first
-    last = _LAST.fullmatch(text)
-    if last and last[1] and meaning_of(last[2].lower()) in {"plain", "pendulum", "smooth"} | (
-        {""} if last[2].isdigit() else set()
-    ):
-        name, unit = name_and_unit(last[1])
-        if unit is not None:
-            return f"{name} {last[2]}", unit
-    if brackets and brackets[-1].end() == len(text):
-        inside = brackets[-1][1]
-        if not inside.strip() or "" not in meanings_of(plain(inside).split()):
-            return _BRACKETS.sub(" ", text) if inside.strip() in {"t", ""} else text, None
-        return text[: brackets[-1].start()].strip(), inside.strip()  # unknown: reported if needed
+    for name, unit in _splits(text):
+        if _is_unit(unit):
+            return name.strip(), unit.strip()
+    bracket = re.search(r"[\(\[\{]([^()\[\]{}]+)[\)\]\}]$", text)
+    if bracket and "" in meanings_of(plain(bracket[1]).split() or [""]):
+        return text[: bracket.start()].strip(), bracket[1].strip()  # reported if it is needed
     return text, None
 
 
@@ -237,22 +235,19 @@ class Heading:
 
     def rank(self, channel: str) -> int | None:
         """Return how well a heading fits a channel, 0 for best; None if it does not."""
-        kind, unit = CHANNELS[channel], self.unit
-        if unit is not None and not kind.has(unit):
+        kind, unit = CHANNELS[channel], spelling(self.unit or "")
+        if self.unit is not None and not kind.has(unit):
             return None
-        if self.meaning in kind.meanings:
-            unknown = "" in self.meanings
-            if unknown and channel.startswith("pixel"):
-                return None
+        unknown = "" in self.meanings
+        if self.meaning in kind.meanings and not (unknown and channel.startswith("pixel")):
             return unknown + 2 * ("smooth" in self.meanings)
-        by_unit = unit is not None and spelling(unit) in kind.units
         if channel not in {"time", "angle", "velocity"} or "error" in self.meanings:
             return None
         if self.meaning in OTHERS:
-            return 6 if by_unit or {*kind.meanings} & {*self.meanings} else None
+            return 6 if unit in kind.units or {*kind.meanings} & {*self.meanings} else None
         owners = [c for c in CHANNELS.values() if self.meaning in c.meanings]
-        if owners and (unit is None or owners[0].has(unit) or self.meaning in _FIRM):
-            return None
-        weak = unit is None and self.meaning == "pendulum"
-        raw = unit is not None and spelling(unit) in RAW
-        return 4 if by_unit or (channel == "angle" and (weak or raw)) else None
+        free = not any(self.unit is None or c.has(unit) for c in owners)
+        if unit in kind.units and free and self.meaning not in _FIRM:
+            return 4
+        weak = self.meaning == "pendulum" and self.unit is None
+        return 5 - weak if channel == "angle" and free and (weak or unit in RAW) else None
