@@ -167,7 +167,8 @@ def identify(  # noqa: PLR0913 (each is asked for by name)
     report = progress or (lambda _done, _total: None)
     sigma, joint, results = None, None, {}
     if BEST in names:
-        joint, results[BEST] = _best(experiment, run, start, effects)
+        freed = [] if effects or start is not None else _doubted_gain(experiment)
+        joint, results[BEST] = _best(experiment, run, start, effects or freed)
         report(next(done), steps)
         if joint is not None:
             sigma = joint.readings[0].sigma
@@ -202,6 +203,13 @@ def _with_drag(joint: JointFit) -> JointFit | None:
     opposes = min(drag.values) > 0
     gap, left = (one.fit.rms**2 - noise**2 for one in (joint, with_drag))
     return with_drag if opposes and left < CLOSED * gap else None
+
+
+def _doubted_gain(experiment: Experiment) -> list[str]:
+    """Return the effect of the sensor's gain if the periods disprove a gain of 1."""
+    runs = [run for run in experiment.runs if run.kind == "free" and not run.hold_out]
+    seen = {finding.what for _, finding in experiment.findings_of(runs)}
+    return ["encoder_gain"] if "angle-scale" in seen else []
 
 
 def _best(

@@ -7,6 +7,7 @@ import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from numpy.polynomial.legendre import legvander
 
 from pendmap.errors import InputError
 from pendmap.formatting import counted
@@ -30,6 +31,10 @@ LEAST_SWING: Final = 5.0  # Least reading of a swing, standard deviations of the
 LARGEST_READING: Final = 1.15  # Greatest reading, over the theoretical maximum: else wrong unit
 ONE_SIDED: Final = 0.15  # Smaller over larger side of the readings below which the axis is radial
 BLIND_SPOT: Final = 0.05  # Relative distance to the centre of oscillation that is refused
+DRIFT_DEGREE: Final = 8  # Degree of the polynomials of time along which a camera drifts
+OFF_CIRCLE: Final = 0.3  # Greatest distance of places from a circle, over their spread, rms
+BLOCKS: Final = 30  # Blocks of a record that give the error of a radius
+MOST_RADIUS_ERROR: Final = 0.5  # Relative standard error of the radius above which it is unknown
 RADIUS_DOUBT: Final = 0.02  # Relative standard error of the radius above which it is reported
 
 
@@ -184,44 +189,67 @@ def _circle_angle(work: Work, x: Floats, y: Floats) -> Finding:
             f"{work.other('angle')}"
         )
     u, v = (x - middle[0]) / size, (y - middle[1]) / size
-    # Initial circle: Kasa's algebraic fit, by least squares of u^2 + v^2.
-    columns = np.column_stack([u, v, np.ones(u.size)])
-    solution = np.linalg.lstsq(columns, u**2 + v**2, rcond=None)[0]
-    a, b = float(solution[0]) / 2, float(solution[1]) / 2
-    radius = math.sqrt(max(float(solution[2]) + a * a + b * b, 1e-12))
-    near = np.ones(u.size, bool)
-    from scipy.optimize import least_squares
-
-    for _ in range(2):
-        inside = u[near], v[near]
-        fit = least_squares(
-            _distances, (a, b, radius), args=inside, method="lm", xtol=1e-14, ftol=1e-14
-        )
-        a, b, radius = fit.x.tolist()
-        rms = math.sqrt(2 * fit.cost / near.sum())
-        error = rms * float(np.linalg.norm(np.linalg.pinv(fit.jac)[2]))
-        away = np.abs(_distances(fit.x, u, v))
-        near = away <= 6 * max(normal_scale(away), 1e-9)
-    if not (math.isfinite(radius) and 0 < radius < 1e3):
+    scaled = 2 * (work.time - work.time[0]) / max(float(np.ptp(work.time)), 1e-12) - 1
+    still, moved = (_circle(u, v, legvander(scaled, degree)) for degree in (0, DRIFT_DEGREE))
+    drifts = u.size * math.log(still[3] / moved[3]) > DRIFT_DEGREE * math.log(u.size)
+    (radius, a), b, error, rms = moved if drifts else still
+    spread = math.sqrt(float(np.var(u) + np.var(v)))
+    if not error < MOST_RADIUS_ERROR * radius or rms > OFF_CIRCLE * spread:
+        more = by_hand(work.where, angle=work.columns["pixel_x"], angle_scale=2.5)
         raise InputError(
             f"{work.where}: pixel_x and pixel_y must be positions of a bob on a circle,"
-            f" they lie on none{work.other('angle')}"
+            f" they lie on none; small swings .4 from the pivot: {more}"
         )
     speed = np.hypot(np.gradient(u, work.time), np.gradient(v, work.time))
     quick = speed >= np.quantile(speed, 0.8)
     down = 1.0 if np.median((v - b)[quick]) > 0 else -1.0
     work.theta = np.unwrap(np.arctan2(u - a, down * (v - b)))
-    centre = middle + size * np.array([a, b])
     if error > RADIUS_DOUBT * radius:
         work.note("circle-uncertain", percent=100 * error / radius)
-    way, radius, rms = "down" if down > 0 else "up", radius * size, rms * size
-    x0, y0 = centre
-    return work.finding("angle-from-pixels", x=x0, y=y0, radius=radius, way=way, rms=rms)
+    if drifts:
+        work.note("frame-drifts", way=size * float(np.ptp(b)))
+    x0, y0 = middle + size * np.array([a, np.mean(b)])
+    sizes = {"radius": radius * size, "error": error * size, "rms": rms * size}
+    return work.finding("angle-from-pixels", x=x0, y=y0, way="down" if down > 0 else "up", **sizes)
 
 
-def _distances(circle: Floats, u: Floats, v: Floats) -> Floats:
-    """Return the distances of points from a circle (centre and radius), positive outside."""
-    return np.asarray(np.hypot(u - circle[0], v - circle[1]) - circle[2])
+def _circle(u: Floats, v: Floats, basis: Floats) -> tuple[Floats, Floats, float, float]:
+    """Return the circle nearest to points, whose centre moves along v as functions of the time.
+
+    They are the radius and u of the centre, its v, the standard error of the radius, and the
+    residual. A motion along u is a drift of the zero, which does not change the radius.
+    """
+    from scipy.optimize import least_squares
+
+    # Initial circle: the algebraic fit, by least squares of u^2 + v^2.
+    algebraic = np.linalg.lstsq(np.column_stack([u, v, basis]), u**2 + v**2, rcond=None)[0]
+    a, b = float(algebraic[0]) / 2, float(algebraic[1]) / 2
+    radius = math.sqrt(max(float(algebraic[2]) + a * a + b * b, 1e-12))
+    circle = np.array([radius, a, b, *np.zeros(basis.shape[1] - 1)])
+    near = np.ones(u.size, bool)
+
+    def away(circle: Floats) -> Floats:
+        return np.asarray(np.hypot(u - circle[1], v - basis @ circle[2:]) - circle[0])
+
+    for _ in range(2):
+        inside = near
+        fit = least_squares(
+            lambda circle, used: away(circle)[used],
+            circle,
+            args=(inside,),
+            method="lm",
+            xtol=1e-14,
+            ftol=1e-14,
+        )
+        circle, every = fit.x, np.abs(away(fit.x))
+        near = every <= 6 * max(normal_scale(every), 1e-9)
+    # Sums over blocks of the record: neighbouring residuals need not be independent.
+    blocks = np.linspace(0, fit.fun.size, min(BLOCKS, fit.fun.size) + 1).astype(int)[:-1]
+    score = np.add.reduceat(fit.jac * fit.fun[:, None], blocks, axis=0)
+    free = blocks.size / max(blocks.size - circle.size, 1)
+    error = math.sqrt(free) * float(np.linalg.norm(score @ np.linalg.pinv(fit.jac.T @ fit.jac)[0]))
+    rms = math.sqrt(2 * fit.cost / max(np.count_nonzero(inside), 1)) or 1e-12
+    return circle[:2], basis @ circle[2:], error, rms
 
 
 def missing(work: Work) -> Finding | None:

@@ -15,8 +15,19 @@ from pendmap.model.quantities import GRAVITY
 from pendmap.records.by_hand import by_hand
 from pendmap.records.description import Column
 from pendmap.records.experiment import finding_of
+from pendmap.records.guesses import ANGLE_CHANNELS, changes, guess, head_of, use_pixels
 from pendmap.records.rod_sensors import accelerometer_of
-from pendmap.records.units import CHANNELS, PIVOT_UNITS, name_and_unit, plain, spelling
+from pendmap.records.units import (
+    ANGLES,
+    CHANNELS,
+    LENGTHS,
+    PIVOT_UNITS,
+    RAW,
+    Heading,
+    name_and_unit,
+    plain,
+    spelling,
+)
 from pendmap.records.work import Work
 
 if TYPE_CHECKING:
@@ -28,20 +39,9 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats
 
 _MOST_NAMED: Final = 8  # Most columns listed in a message
-# Channels from which an angle can be computed
-ANGLE_CHANNELS: Final = ("angle", "velocity", "pixel_x", "pixel_y", "acceleration", "peaks")
-POSITION_NAME: Final = "pos(ition)?"
-POSITION_AGREES: Final = 0.9  # Least correlation of a position with the integrated velocity
-MOTOR_NAMES: Final = re.compile(
-    r"\b(torques?|drehmoment|couple|tau|currents?|strom|motors?|pwm|duty|effort|actuator|u)\b"
-)
 MOTOR_UNITS: Final = ("nm", "mnm", "a", "ma")
-PIVOT_NAMES: Final = re.compile(
-    r"\b(pivot|cart|carriage|trolley|slider?|shaker|stage|base|platform|support|suspension|wagen)\b"
-)
 # Default unit of a pivot's column by words in its name
 PIVOT_KINDS: Final = ((r"\bacc", "m/s2"), (r"\b(vel|speed)", "m/s"), (r"\b(pos|place|x)", "m"))
-ANGLE_NAMES: Final = re.compile(r"pos(ition)?|.*(angle|winkel|theta|encoder).*")
 MOST_UNUSED: Final = 12  # Most unused columns listed in a message
 
 
@@ -79,15 +79,7 @@ def channels_of(  # noqa: C901 (a step each)
         findings.append(finding_of("rate-unused", column=head, rate=rate))
     _check(places, table, where, timed="time" in values)
     for channel, place in places.items():
-        if place in table.texts:
-            free = [
-                k + 1 for k in range(len(table.names)) if k not in {*places.values(), *table.texts}
-            ]
-            more = f"; {by_hand(where, **{channel: free[0]})} takes another" if free else ""
-            head = f"column {place + 1} ({head_of(table, place)!r})"
-            raise InputError(
-                f"{where}: {channel}: {head} must be numbers, got {table.texts[place]}{more}"
-            )
+        _refuse_text(table, place, places, f"{where}: {channel}")
         column, counts = asked.get(channel, Column()), known.get("encoder_counts")
         raw, head = table.values[:, place], table.names[place]
         values[channel] = _in_si(channel, raw, head, column, counts, f"{where}: {channel}")
@@ -127,6 +119,18 @@ def channels_of(  # noqa: C901 (a step each)
     )
 
 
+def _refuse_text(table: Table, place: int, places: Mapping[str, int], where: str) -> None:
+    """Raise InputError for a column of text, with the command that takes another."""
+    if place not in table.texts:
+        return
+    taken, channel = {*places.values(), *table.texts}, where.rpartition(" ")[2]
+    free = [k + 1 for k in range(len(table.names)) if k not in taken]
+    file = where.rpartition(": ")[0]
+    more = f"; {by_hand(file, **{channel: free[0]})} takes another" if free else ""
+    head = f"column {place + 1} ({head_of(table, place)!r})"
+    raise InputError(f"{where}: {head} must be numbers, got {table.texts[place]}{more}")
+
+
 def _place(name: str | int, table: Table, where: str) -> int:
     """Return the index of a column by its number or its heading, with or without the unit."""
     if isinstance(name, int) and name <= len(table.names):
@@ -150,12 +154,13 @@ def _names(table: Table) -> str:
 def _check(places: dict[str, int], table: Table, where: str, *, timed: bool) -> None:
     """Raise InputError for a table without times or angles, or a column with two channels."""
     timed = timed or "time" in places
-    if not (timed and any(channel in places for channel in ANGLE_CHANNELS)):
-        what, wanted = ("angles", "one") if timed else ("times", "one, or the rate in Hz,")
+    if not timed:
         raise InputError(
-            f"{where}: no column of {what}: {wanted} must be given, got {_names(table)}:"
-            f" {_example(places, table, where, timed=timed)}"
+            f"{where}: no column of times: one, or the rate in Hz, must be given, got"
+            f" {_names(table)}: {_example(places, table, where, timed=timed)}"
         )
+    if not any(channel in places for channel in ANGLE_CHANNELS):
+        raise InputError(f"{where}: no column of angles: {_missing_angle(table, places, where)}")
     for one, other in (("time", "angle"), ("pixel_x", "pixel_y")):
         if one in places and places[one] == places.get(other):
             name = table.names[places[one]]
@@ -191,21 +196,40 @@ def in_order(values: Floats) -> bool:
     return bool(np.any(steps > 0) and np.all(steps >= 0))
 
 
+def _missing_angle(table: Table, places: Mapping[str, int], where: str) -> str:
+    """Return what is no angle in a table, and the command that reads it all the same."""
+    free = [k for k in range(len(table.names)) if k not in places.values()]
+    for k, head in ((k, Heading.of(table.names[k])) for k in free):
+        unit = spelling(head.unit or "px")
+        if unit in LENGTHS and (head.unit or head.meaning in {"x", "y"}):
+            length = 400 if unit == "px" else 0.4 / LENGTHS[unit]
+            more = by_hand(where, angle=k + 1, angle_scale=f"{1 / length:.4g}")
+            return (
+                f"{table.names[k]!r} is a length: x and y must be given, or the distance from the"
+                f" pivot, as here of {length:g} {head.unit or 'px'}: {more}"
+            )
+        if head.unit is not None and {"angle", "velocity"} & {*head.meanings}:
+            more = by_hand(where, angle=k + 1, angle_unit="deg")
+            return f"{head.unit!r} is not known as a unit of {table.names[k]!r}: {more}"
+    more = _example(places, table, where, timed=True)
+    return f"one must be given, got {_names(table)}: {more}"
+
+
 def _in_si(  # noqa: PLR0913, PLR0917 (what is known of the column)
     channel: str, raw: Floats, head: str, column: Column, counts: int | None, where: str
 ) -> Floats:
     """Return the values of a column in SI, by its declared scale or its unit."""
     if column.scale is not None:
         return (raw - column.zero) * column.scale
-    unit = column.unit
-    if unit is None:
-        name, unit = name_and_unit(head)
-        # The name of a column "volts" or "counts" is its unit.
-        unit = unit or (name if re.fullmatch("volts?|counts?|adc", plain(name)) else None)
+    unit = column.unit or name_and_unit(head)[1]
     if unit is None:
         return raw - column.zero
-    if counts and re.fullmatch("counts?|ticks?", plain(unit)):
+    if counts and spelling(unit) == "counts":
         return (raw - column.zero) * 2 * np.pi / counts
+    if spelling(unit) in RAW and channel in {"angle", "velocity"} and column.unit is None:
+        name, value = ("counts_per_turn", 2400) if "count" in spelling(unit) else ("angle_scale", 1)
+        more = by_hand(where.removesuffix(f": {channel}"), **{name: value})
+        raise InputError(f"{where}: the scale of {head!r} must be given, like {more}")
     return (raw - column.zero) * CHANNELS[channel].factor(unit, where)
 
 
@@ -221,118 +245,6 @@ def _pivot(
     places = {k: _place(v, table, f"{where}: pivot: {k}") for k, v in names.items() if v}
     motion = {way: table.values[:, place] * factor for way, place in places.items()}
     return motion, unit, list(places.values())
-
-
-def use_pixels(table: Table, places: dict[str, int], asked: Mapping[str, Column]) -> list[Finding]:
-    """Assign the pixel coordinates of a table whose angle column is constant."""
-    guessed = _by_name(table, {k: v for k, v in places.items() if k != "angle"})
-    place = places.get("angle", guessed.get("angle"))
-    both = guessed | places
-    pair: dict[str, int] = {c: both[c] for c in ("pixel_x", "pixel_y") if c in both}
-    if place is None or "angle" in asked or len(pair) < 2:
-        return []
-    if changes(table.values[:, place]) or not changes(table.values[:, pair["pixel_x"]]):
-        return []
-    places.pop("angle", None)
-    places.update(pair)
-    x, y = (table.names[k] for k in pair.values())
-    return [finding_of("angle-constant", angle=head_of(table, place), x=x, y=y)]
-
-
-def guess(table: Table, places: dict[str, int], *, timed: bool) -> list[Finding]:
-    """Assign missing channels by common column names, or by position without names."""
-    if not any(table.names):
-        return _by_position(table, places, timed=timed)
-    guessed = _by_name(table, places)
-    if "time" in places and any(channel in places for channel in ANGLE_CHANNELS):
-        guessed = {c: k for c, k in guessed.items() if c in {"velocity", "trigger"}}
-    # An angle given with pixel coordinates was computed from them.
-    pair = all(name in places or name in guessed for name in ("pixel_x", "pixel_y"))
-    if "angle" in places or "angle" in guessed or not pair:
-        guessed = {c: k for c, k in guessed.items() if not c.startswith("pixel")}
-    if "pixel_x" in places:
-        guessed.pop("angle", None)
-    if not {"angle", "pixel_x", "peaks"} & {*places, *guessed}:
-        position = position_of(table, places | guessed)
-        guessed |= {} if position is None else {"angle": position}
-    if not timed and not any(channel in places or channel in guessed for channel in ANGLE_CHANNELS):
-        free = [k for k in range(table.values.shape[1]) if k not in guessed.values()]
-        guessed |= {"angle": free[0]} if len(free) == 1 else {}
-    places.update(guessed)
-    names = ", ".join(f"{channel} is {table.names[k]!r}" for channel, k in guessed.items())
-    return [finding_of("columns-guessed", names=names)] if guessed else []
-
-
-def _by_name(table: Table, places: dict[str, int]) -> dict[str, int]:
-    """Return columns with common names for channels without; of axes, that which varies most."""
-    guessed: dict[str, int] = {}
-    for channel, kind in CHANNELS.items():
-        taken = {*places.values(), *guessed.values()}
-        fitting = [k for k in _fitting(table, channel, kind.names) if k not in taken]
-        if channel in places or not fitting:
-            continue
-        columns = table.values[:, fitting]
-        spread = np.std(np.where(np.isfinite(columns), columns, 0.0), axis=0)
-        axes = channel in {"velocity", "acceleration"} and len(fitting) > 1
-        guessed[channel] = fitting[int(np.argmax(spread)) if axes else 0]
-    return guessed
-
-
-def _fitting(table: Table, channel: str, names: str) -> list[int]:
-    """Return the columns whose name matches and whose unit, if any, is one of the channel's."""
-    split = [name_and_unit(head) for head in table.names]
-    return [
-        k
-        for k, (name, unit) in enumerate(split)
-        if (unit is None or CHANNELS[channel].has(unit)) and re.fullmatch(names, plain(name))
-    ]
-
-
-def _by_position(table: Table, places: dict[str, int], *, timed: bool) -> list[Finding]:
-    """Assign time and angle in a table without headings."""
-    free = [k for k in range(table.values.shape[1]) if k not in places.values()]
-    guesses = []
-    if not timed:  # the rate is known: ignore columns that number the readings
-        free = [k for k in free if np.any(np.diff(table.values[:, k]) != 1)]
-    if "time" not in places and free:
-        steps = np.diff(table.values[:, free], axis=0)
-        rises = np.sum(steps > 0, axis=0) > 0.9 * np.sum(np.isfinite(steps), axis=0)
-        if rises.any():
-            k = places["time"] = free.pop(int(np.argmax(rises)))
-            guesses.append(f"column {k + 1} is the time in s")
-    if free and not any(channel in places for channel in ANGLE_CHANNELS):
-        places["angle"] = free[0]
-        guesses.append(f"column {free[0] + 1} is the angle")
-    finding = finding_of("columns-guessed.places", names=", ".join(guesses))
-    return [finding] if guesses else []
-
-
-def position_of(table: Table, places: Mapping[str, int]) -> int | None:
-    """Return the column named position, unless it contradicts a velocity; else None."""
-    from scipy.signal import detrend
-
-    taken = places.values()
-    fitting = [k for k in _fitting(table, "angle", POSITION_NAME) if k not in taken]
-    if len(fitting) != 1 or "velocity" not in places:
-        return fitting[0] if len(fitting) == 1 else None
-    both = table.values[:, [fitting[0], places["velocity"]]]
-    both = both[np.isfinite(both).all(axis=1)]
-    if both.shape[0] < 5:
-        return None
-    one, other = detrend(both[:, 0]), detrend(np.cumsum(both[:, 1]))
-    size = float(np.linalg.norm(one) * np.linalg.norm(other))
-    return fitting[0] if size > 0 and float(one @ other) > POSITION_AGREES * size else None
-
-
-def head_of(table: Table, place: int) -> str:
-    """Return the heading of a column."""
-    return table.names[place] or f"column {place + 1}"
-
-
-def changes(values: Floats) -> bool:
-    """Return whether a column has at least two different values."""
-    seen = values[np.isfinite(values)]
-    return bool(seen.size) and float(np.ptp(seen)) > 0
 
 
 def _unused(
@@ -354,15 +266,14 @@ def _unused(
 
 def _suggestion(head: str, channels: Collection[str], plan: RunPlan) -> list[Finding]:
     """Return the finding that a heading suggests: a motor, an angle or a pivot."""
-    name, unit = name_and_unit(head)
-    name, unit = plain(name), spelling(unit or "")
-    words = plain(head)
-    if (MOTOR_NAMES.search(name) or unit in MOTOR_UNITS) and plan.kind == "free":
+    heading, words = Heading.of(head), plain(head)
+    unit = spelling(heading.unit or "")
+    if (heading.meaning in {"drive", "motor"} or unit in MOTOR_UNITS) and plan.kind == "free":
         return [finding_of("motor-column", head=head)]
     bare = "angle" not in channels and "peaks" not in channels
-    if bare and (ANGLE_NAMES.fullmatch(name) or unit in {"rad", "deg", "°"}):
+    if bare and (heading.meaning in {"angle", "position"} or unit in ANGLES):
         return [finding_of("angle-column", head=head)]
-    if PIVOT_NAMES.search(words) and plan.pivot is None:
+    if "pivot" in heading.meanings and plan.pivot is None:
         kind = next((u for pattern, u in PIVOT_KINDS if re.search(pattern, words)), "m")
         unit = unit if unit in PIVOT_UNITS else kind
         return [finding_of("pivot-column", head=head, unit=unit)]

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Final
 from pendmap.errors import InputError
 from pendmap.files import read_whole
 from pendmap.formatting import listed
-from pendmap.records.channels import ANGLE_CHANNELS, guess
 from pendmap.records.experiment import finding_of
+from pendmap.records.guesses import ANGLE_CHANNELS, guess
 from pendmap.records.matlab import matlab_frame
 from pendmap.records.tables import MOST_BYTES, decoded, refuse_large, table_of
 from pendmap.records.text import parsed

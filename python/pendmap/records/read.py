@@ -19,10 +19,12 @@ from pendmap.records.description import NAME, Description, RunPlan, description_
 from pendmap.records.experiment import Experiment, Finding, Run, finding_of
 from pendmap.records.formats import TABLES, read_table
 from pendmap.records.frames import frame_of
+from pendmap.records.guesses import side_by_side
 from pendmap.records.overrides import ByHand, by_option, name_columns, override, refuse_unused
 from pendmap.records.rod_sensors import gyroscope_of
 from pendmap.records.rules import OF_RELEASE, RULES, apply
 from pendmap.records.tables import table_of
+from pendmap.records.work import Work
 
 if TYPE_CHECKING:
     from typing import Unpack
@@ -33,7 +35,6 @@ if TYPE_CHECKING:
 
     from pendmap.records.overrides import Taken
     from pendmap.records.text import Table
-    from pendmap.records.work import Work
 
     Frame: TypeAlias = pd.DataFrame | pd.Series | xr.Dataset | xr.DataArray
     Records: TypeAlias = Experiment | Run | Frame | str | os.PathLike[str]
@@ -286,10 +287,15 @@ def _runs(  # noqa: PLR0913, PLR0917 (what is known of the file)
     if plan.file not in tables:
         tables[plan.file] = read_table(path, description.reader)
     table, digest = tables[plan.file]
-    work = channels_of(table, description, plan, str(path))
-    refuse_unused(work)
-    apply(RULES, work)
-    parts, shared = work.split_by_release()
+    named = any(column.name for column in description.columns.values())
+    parts, shared = list[Work](), list[Finding]()
+    for beside in [table] if named else side_by_side(table):
+        work = channels_of(beside, description, plan, str(path))
+        refuse_unused(work)
+        apply(RULES, work)
+        releases, others = work.split_by_release()
+        parts += releases
+        shared += others
     runs = []
     for k, part in enumerate(parts, 1):
         apply(OF_RELEASE, part)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.formatting import counted
-from pendmap.records.scale import gain_of
+from pendmap.records.scale import GAIN_KNOWN, gain_of
 
 if TYPE_CHECKING:
     from pendmap.records.experiment import Finding
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats
 
 NYQUIST: Final = 2.0  # Fewest readings per period of the drive that resolve it
-GAIN_KNOWN: Final = 0.1  # Half-width of the gain's 95 % interval above which it is reported
 LEAST_USED: Final = 0.1  # Share of readings in motion used by a fit below which a warning is given
 RESTING: Final = ("held", "rest")  # Segments without motion
 ON_STEPS: Final = 0.12  # Greatest rms distance from multiples of a step, in steps; chance: 0.29

@@ -77,6 +77,7 @@ RULES: Final[Rules] = (
     ("sampled", motion.moves),
     ("scale", scale.seconds),
     ("scale", scale.radians),
+    ("scale", scale.one_sided),
     ("scale", scale.curvature),
     ("scale", scale.period_of_rig),
     ("scale", scale.sampling),

@@ -26,6 +26,9 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats, Indices
 
 FEWEST_PERIODS: Final = 6  # Fewest periods that are analysed
+LEAST_GROWTH: Final = 1e-4  # Growth of the period, over a pendulum's, of readings that show none
+ONE_SIDED: Final = 0.1  # Greatest decay of one side, over that of the other, of what is no angle
+GAIN_KNOWN: Final = 0.1  # Half-width of the gain's 95 % interval above which it is reported
 LARGEST_SWING: Final = 3.0  # Largest amplitude, rad, at which the increase of the period is used
 LEAST_ERROR: Final = 1e-3  # Least relative error of a scale factor
 LONGEST_PERIOD: Final = 60.0  # Longest period of a laboratory pendulum, s
@@ -116,10 +119,17 @@ def gain_of(time: Floats, theta: Floats, count: float) -> tuple[float, float] | 
     periods = periods_of(time, theta - (middle_of(time, theta) or 0.0), count)
     if periods is None or float(np.max(periods.amplitude)) > LARGEST_SWING:
         return None
+    return gain_interval(periods)
+
+
+def gain_interval(periods: Periods) -> tuple[float, float]:
+    """Return the 95 % interval of reading over angle from periods."""
     share, error = share_of(periods, growth(periods.amplitude))
     least, most = share - Z95 * error, share + Z95 * error
-    low = 1 / math.sqrt(most) if most > 0 else 0.0
-    return low, 1 / math.sqrt(least) if least > 0 else math.inf
+    # Of wide swings the growth is more than the square of the angle.
+    wide = factor_of(periods, share)[0] / math.sqrt(share) if share > 3 * error else 1.0
+    low = 1 / (wide * math.sqrt(max(most, LEAST_GROWTH)))
+    return low, 1 / (wide * math.sqrt(least)) if least > 0 else math.inf
 
 
 def middle_of(time: Floats, theta: Floats) -> float | None:
@@ -133,7 +143,7 @@ def middle_of(time: Floats, theta: Floats) -> float | None:
 
 def factor_of(periods: Periods, share: float) -> tuple[float, float]:
     """Return the factor on the readings that gives a pendulum's periods, and its error."""
-    best, error = math.sqrt(max(share, 1e-4)), 0.0
+    best, error = math.sqrt(max(share, LEAST_GROWTH)), 0.0
     for _ in range(12):  # Gauss-Newton steps
         grown = growth(best * periods.amplitude)
         slope = (growth(1.001 * best * periods.amplitude) - grown) / (0.001 * best)
@@ -218,6 +228,24 @@ def radians(work: Work) -> Finding | None:
     return work.finding("angle-unit.degrees", read=read, largest=largest)
 
 
+def one_sided(work: Work) -> None:
+    """Raise InputError for readings of which one side decays alone: no angle does that."""
+    first, *_, last = np.array_split(work.theta[work.trusted], 4)
+    if not work.free or not last.size:
+        return
+    ends = [np.quantile(part, (0.02, 0.98)) for part in (first, last)]
+    if np.count_nonzero(np.diff(first > np.mean(ends[0]))) < FEWEST_PERIODS:
+        return
+    less, more = sorted(np.abs(ends[1] - ends[0]).tolist())
+    if less < ONE_SIDED * more and more > ONE_SIDED * float(np.ptp(work.theta)):
+        others = f": {by_hand(work.where, angle=work.unused[0])}" if work.unused else ""
+        raise InputError(
+            f"{work.where}: angles must swing to both sides of the rest, and the decay of"
+            f" {work.columns.get('angle')!r} is on one side of it, as of a cosine, a height or an"
+            f" absolute value: another column must be the angle{others}"
+        )
+
+
 def curvature(work: Work) -> Finding | None:
     """Report periods that do not increase with amplitude as a pendulum's do."""
     periods = _periods(work)
@@ -226,9 +254,10 @@ def curvature(work: Work) -> Finding | None:
     largest, grown = float(np.max(periods.amplitude)), growth(periods.amplitude)
     if largest > LARGEST_SWING or np.ptp(grown) < 2e-3:
         return None
-    share, error = share_of(periods, grown)
-    if error >= 0.1 or abs(share - 1) <= 0.3 + 5 * error:
+    low, high = gain_interval(periods)
+    if low <= 1 + GAIN_KNOWN and high >= 1 - GAIN_KNOWN:
         return None
+    share, error = share_of(periods, grown)
     factor, spread = factor_of(periods, share)
     return work.finding(
         "angle-unit.flat" if share < 0.1 else "angle-scale",
@@ -236,9 +265,10 @@ def curvature(work: Work) -> Finding | None:
         high=largest,
         share=share,
         error=error,
+        gain=1 / factor,
+        spread_gain=spread / factor**2,
         factor=factor,
         spread=spread,
-        channel="velocity" if work.integrated else "angle",
     )
 
 

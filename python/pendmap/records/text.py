@@ -20,7 +20,7 @@ from pendmap.errors import InputError, short_repr
 from pendmap.formatting import counted, listed
 from pendmap.records.cells import column_of, counted_since, split, unwrapped, weight
 from pendmap.records.experiment import finding_of
-from pendmap.records.units import CHANNELS, name_and_unit, plain, spelling
+from pendmap.records.units import CHANNELS, Heading, name_and_unit, spelling
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -306,13 +306,12 @@ def _headings(
 
 
 def is_known(head: str, channel: str | None = None) -> bool:
-    """Return whether a heading has a usual name, or a unit, of a channel or any."""
-    name, unit = name_and_unit(head)
-    kinds = CHANNELS.values() if channel is None else [CHANNELS[channel]]
-    return bool(name) and any(
-        re.fullmatch(kind.names, plain(name)) or (channel is None and unit and kind.has(unit))
-        for kind in kinds
-    )
+    """Return whether a heading has a usual word, or a unit, of a channel or any."""
+    heading = Heading.of(head)
+    if channel is not None:
+        return heading.meaning in CHANNELS[channel].meanings
+    words = any(heading.meaning in kind.meanings for kind in CHANNELS.values())
+    return bool(heading.name) and (words or heading.unit is not None)
 
 
 def _parts(line: str, columns: Sequence[Column], form: _Form) -> list[str]:

@@ -1,16 +1,19 @@
-"""Channels of a record, their units, and common column names."""
+"""Channels of a record, their units, and the words of headings, which stand in ``words.toml``."""
 
 from __future__ import annotations
 
 import dataclasses
-import math
+import functools
 import re
-from typing import TYPE_CHECKING, Final
+import tomllib
+import unicodedata
+from importlib import resources
+from typing import TYPE_CHECKING, Any, Final
 
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Iterator, Mapping
 
 # Units of a recorded pivot: the SI unit and the factor to it
 PIVOT_UNITS: Final = {
@@ -21,17 +24,70 @@ PIVOT_UNITS: Final = {
     "cm": ("m", 1e-2),
     "mm": ("m", 1e-3),
 }
-DEGREE: Final = math.pi / 180
+_TABLES: Final[dict[str, Any]] = tomllib.loads(
+    resources.files("pendmap.records").joinpath("words.toml").read_text("utf-8")
+)
+TIMES: Final[dict[str, float]] = {name: row[0] for name, row in _TABLES["time"].items()}
+ANGLES: Final[dict[str, float]] = {name: row[0] for name, row in _TABLES["angle"].items()}
+LENGTHS: Final[dict[str, float]] = {name: row[0] for name, row in _TABLES["length"].items()}
+RAW: Final = frozenset(_TABLES["raw"])
+DEGREE: Final = ANGLES["deg"]
+SPEEDS: Final = {f"{a}/{t}": ANGLES[a] / TIMES[t] for t in ("s", "min") for a in ANGLES}
+# Units of an angular acceleration, in rad/s^2
+ANGULAR_ACCELERATIONS: Final = {f"{name}/s2": factor for name, factor in ANGLES.items()}
+_ACCELERATIONS: Final = {
+    **{f"{name}/s2": factor for name, factor in LENGTHS.items() if name != "px"},
+    "g": 9.80665,
+    **ANGULAR_ACCELERATIONS,
+}
+
+
+def _spellings() -> Iterator[tuple[str, str]]:
+    """Yield each spelling of a unit with its name in the tables."""
+    for quantity in ("time", "angle", "length"):
+        for name, (_, words) in _TABLES[quantity].items():
+            yield from ((word, name) for word in (name, *words.split()))
+    for name, words in (_TABLES["raw"] | _TABLES["spelled"]).items():
+        yield from ((word, name) for word in (name.lower(), *words.split()))
+
+
+_UNITS: Final[dict[str, str]] = dict(_spellings())
+# Meanings in the order in which they decide about a heading
+MEANINGS: Final = tuple(_TABLES["words"])
+# Meanings of columns that are not the pendulum's
+OTHERS: Final = ("drive", "motor", "pivot", "error")
+_WORDS: Final[dict[str, str]] = {
+    word: name for name, words in _TABLES["words"].items() for word in words.split()
+}
+_ENDINGS: Final = ("", "s", "es", "n", "en")  # of plurals
+_FIRM: Final = ("velocity", "acceleration", "trigger")  # Meanings that no unit contradicts
+_FURTHER: Final = ("plain", "pendulum", "smooth")  # Meanings of words that follow a unit
+_SHORTEST_STEM: Final = 3
+_SHORTEST_PART: Final = 4  # Shortest part of a compound, letters, but for Chinese
+_SIGNS: Final = str.maketrans("˚º∘ł（）［］【】：´’′`μµ−⋅·*", "°°°l()[][]:''''uu-...")
+_MARKS: Final = ((r"([α-ω])\u0308", r"\1 ddot"), (r"([α-ω])\u0307", r"\1 dot"))
+_DERIVATIVES: Final = (
+    (r"\bd\^?2\s*\(?([^\W\d_]+)\)?\s*/\s*d\s*t\s*\^?2", r"\1 ddot"),
+    (r"\bd\s*\(?([^\W\d_]+)\)?\s*/\s*d\s*t\b", r"\1 dot"),
+    (r"([α-ω]|theta|phi)'", r"\1 dot"),
+    (r"\(\s*t\s*\)", " "),
+)
+_BRACKETS: Final = re.compile(r"\s*/?\s*[\(\[\{]([^()\[\]{}]*)[\)\]\}]")
+_CAMEL: Final = r"(?<=[a-z])(?=[A-Z])"
+_BREAKS: Final = re.compile(rf"\s*[/,;:]\s*|(?:[\s_]+(?:in|en|em|w)[\s_]+)|[\s_]+|{_CAMEL}")
+_PER: Final = re.compile(r"[\s_](?:per|pro|par|por|al|na)[\s_]")
+_LAST: Final = re.compile(r"(.*?)[\s_#.-]*(\d+|[^\W\d_]+)")
+_TOKENS: Final = re.compile(r"[\u3400-\u9fff]+|[^\W\d_\u3400-\u9fff]+'*")
 
 
 @dataclasses.dataclass(frozen=True)
 class Channel:
-    """Quantity of a column, with its units and names."""
+    """Quantity of a column, with its units and usual heading."""
 
     unit: str  # in SI
-    units: Mapping[str, float]  # factor to SI by plain spelling
+    units: Mapping[str, float]  # factor to SI by name
     default: str  # usual heading
-    names: str  # pattern of other names, plain (lower case, without unit)
+    meanings: tuple[str, ...] = ()  # of the words of other headings
 
     def factor(self, unit: str, where: str) -> float:
         """Return the factor from a unit to SI; raise InputError for other units."""
@@ -45,111 +101,153 @@ class Channel:
 
     def has(self, unit: str) -> bool:
         """Return whether a text is one of the channel's units, raw ones included."""
-        return spelling(unit) in self.units or spelling(unit) in _RAW
+        return spelling(unit) in self.units or spelling(unit) in RAW
 
 
-_RAW: Final = ("v", "mv", "volt", "volts", "count", "counts", "tick", "ticks", "adc", "lsb")
-_TIMES: Final = {
-    **dict.fromkeys(("s", "sec", "secs", "second", "seconds", "sek", "sekunden"), 1.0),
-    **dict.fromkeys(("ms", "msec", "millis", "millisecond", "milliseconds"), 1e-3),
-    **dict.fromkeys(("us", "usec", "micros", "microsecond", "microseconds"), 1e-6),
-    **dict.fromkeys(("ns", "nsec", "nanoseconds"), 1e-9),
-    **dict.fromkeys(("min", "minutes"), 60.0),
-    **dict.fromkeys(("h", "hours"), 3600.0),
-}
-_ANGLES: Final = {
-    **dict.fromkeys(("rad", "radian", "radians"), 1.0),
-    "mrad": 1e-3,
-    **dict.fromkeys(("deg", "degree", "degrees", "grad", "°"), DEGREE),
-    **dict.fromkeys(("rev", "turn", "turns", "revolutions"), math.tau),
-}
-_SPEEDS: Final = {
-    **dict.fromkeys(("rad/s", "rads", "1/s"), 1.0),
-    "mrad/s": 1e-3,
-    **dict.fromkeys(("deg/s", "°/s", "dps", "degs"), DEGREE),
-    "rpm": math.tau / 60,
-    **dict.fromkeys(("rev/s", "rps"), math.tau),
-}
-# Units of an angular acceleration, in rad/s^2
-ANGULAR_ACCELERATIONS: Final = {
-    **dict.fromkeys(("rad/s2", "1/s2"), 1.0),
-    **dict.fromkeys(("deg/s2", "°/s2"), DEGREE),
-}
-_ACCELERATIONS: Final = {
-    **dict.fromkeys(("m/s2", "m/s/s", "ms-2", "m/ss"), 1.0),
-    "g": 9.80665,
-    **ANGULAR_ACCELERATIONS,
-}
-_LENGTHS: Final = {
-    **dict.fromkeys(("px", "pixel", "pixels"), 1.0),
-    "m": 1.0,
-    "cm": 1e-2,
-    "mm": 1e-3,
-}
 # Channels by name, in the order in which columns are assigned
 CHANNELS: Final = {
-    "time": Channel(
-        "s",
-        _TIMES,
-        "t_s",
-        "t|time|zeit|temps|tiempo|tempo|time ?stamp|elapsed( time)?|clock|seconds_elapsed",
-    ),
-    "angle": Channel(
-        "rad",
-        _ANGLES,
-        "theta_rad",
-        "theta|θ|th|angle|winkel|alpha|phi|φ|encoder|ang(le)? ?pos(ition)?|angular position"
-        "|volts?|voltage|counts?|adc",
-    ),
-    "velocity": Channel(
-        "rad/s",
-        _SPEEDS,
-        "velocity_rad_s",
-        "omega|ω|(angular )?velocity|theta ?dot|dtheta|gyro(scope)?( ?[xyz])?"
-        "|rot(ation)? ?rate( ?[xyz])?|w[xyz]?|omega filtered",
-    ),
-    "acceleration": Channel(
-        "m/s2",
-        _ACCELERATIONS,
-        "acceleration_m_s2",
-        "((linear|angular) )?acc(el|eleration|elerometer)?( ?[xyz])?|a[xyz]?|theta ?ddot",
-    ),
-    "pixel_x": Channel("px", _LENGTHS, "pixel_x", "x|pixel ?x|x ?pixel|px x|pos ?x"),
-    "pixel_y": Channel("px", _LENGTHS, "pixel_y", "y|pixel ?y|y ?pixel|px y|pos ?y"),
-    "peaks": Channel("rad", _ANGLES, "peak_rad", "peaks?|amplitudes?|turning points?"),
-    "trigger": Channel(
-        "1", {"1": 1.0, "v": 1.0, "mv": 1e-3, "ttl": 1.0}, "trigger", "trigger|trig|sync|ttl"
-    ),
+    "time": Channel("s", TIMES, "t_s", ("time",)),
+    "angle": Channel("rad", ANGLES, "theta_rad", ("angle",)),
+    "velocity": Channel("rad/s", SPEEDS, "velocity_rad_s", ("velocity", "gyroscope")),
+    "acceleration": Channel("m/s2", _ACCELERATIONS, "acceleration_m_s2", ("acceleration",)),
+    "pixel_x": Channel("px", LENGTHS, "pixel_x", ("x",)),
+    "pixel_y": Channel("px", LENGTHS, "pixel_y", ("y",)),
+    "peaks": Channel("rad", ANGLES, "peak_rad", ("peaks",)),
+    "trigger": Channel("1", {"1": 1.0, "V": 1.0, "mV": 1e-3, "ttl": 1.0}, "trigger", ("trigger",)),
 }
-_IN_BRACKETS: Final = re.compile(r"^(?P<name>.*?)\s*[\(\[\{](?P<unit>[^\)\]\}]*)[\)\]\}]\s*$")
-_AFTER: Final = re.compile(r"^(?P<name>[^/]+?)\s*(?:/\s*|,\s*|\s+in\s+)(?P<unit>.+)$")
-_BEHIND: Final = re.compile(r"^(?P<name>.+?)[_ ](?P<unit>[a-zµ°]+(?:_s2?)?)$", re.IGNORECASE)
+
+
+def _folded(text: str) -> str:
+    """Return a text in lower case without accents; dots above Greek letters become words."""
+    text = unicodedata.normalize("NFKD", text.translate(_SIGNS)).translate(_SIGNS).casefold()
+    for mark, word in _MARKS:
+        text = re.sub(mark, word, text)
+    return "".join(letter for letter in text if not unicodedata.combining(letter))
+
+
+def _stems(word: str) -> Iterator[str]:
+    """Yield a word, and what it may be the plural of."""
+    for ending in _ENDINGS:
+        if word.endswith(ending) and (not ending or len(word) - len(ending) >= _SHORTEST_STEM):
+            yield word.removesuffix(ending)
 
 
 def spelling(unit: str) -> str:
-    """Return a unit in the spelling of the tables of units."""
-    text = unit.strip().lower().replace("²", "2").replace("^", "").replace("**", "")
-    text = text.replace("µ", "u").replace("μ", "u").replace("·", "").replace(" ", "")
-    text = text.replace("º", "°").replace("s⁻¹", "/s").replace("s-1", "/s")
-    return re.sub(r"_s(2?)$", r"/s\1", text)
+    """Return a unit in the spelling of the tables of units, like "deg/s" for "°·s⁻¹"."""
+    text = _PER.sub("/", _folded(unit).strip()).replace("^", "")
+    text = re.sub(r"\s*/\s*", "/", text).replace("s-1", "/s").replace("s-2", "/s2")
+    text = re.sub(r"[\s_.]*/", "/", text)
+    text = _UNITS.get(text, text)
+    text = re.sub(r"(?<=.)[\s_.](s2?)$", r"/\1", text).replace("/s/s", "/s2")
+    over, *under = text.split("/")
+    names = ["rad" if over == "1" and under else _name(over)]
+    names += [_name(part.removesuffix("2")) + "2" * part.endswith("2") for part in under]
+    return "/".join(names)
+
+
+def _name(unit: str) -> str:
+    """Return the name of a unit in the tables, or the unit itself."""
+    return next((_UNITS[stem] for stem in _stems(unit.strip()) if stem in _UNITS), unit.strip())
 
 
 def plain(name: str) -> str:
-    """Return a name in the spelling of the patterns: lower case, single spaces."""
-    return " ".join(name.strip().lower().replace("_", " ").replace("-", " ").split())
+    """Return a name as words: lower case, no accents, no digits, single spaces."""
+    text = _folded(re.sub(_CAMEL, " ", name))
+    for pattern, words in _DERIVATIVES:
+        text = re.sub(pattern, words, text)
+    return " ".join(_TOKENS.findall(text))
 
 
+@functools.cache
+def meaning_of(word: str) -> str:
+    """Return the meaning of a word, or of the last part of a compound; empty if it is unknown."""
+    for stem in _stems(word):
+        if stem in _WORDS:
+            return _WORDS[stem]
+    parts = [w for w in _WORDS if len(w) >= _SHORTEST_PART or w > "\u3400"]
+    ends = [w for w in parts if word.endswith(w)]
+    begins = [w for w in parts if word.startswith(w) and _WORDS[w] in OTHERS]
+    longest = max(begins or ends, key=len, default="")
+    return _WORDS[longest] if ends else ""
+
+
+def meanings_of(words: Iterable[str]) -> list[str]:
+    """Return the meanings of words, the deciding one first; empty ones, of unknown words, last."""
+    return sorted({*map(meaning_of, words)}, key=(*MEANINGS, "").index)
+
+
+def _is_unit(text: str) -> bool:
+    """Return whether a text is a unit of any channel, written with a letter or a sign."""
+    return text != "1" and any(channel.has(text) for channel in CHANNELS.values())
+
+
+def _splits(text: str) -> Iterator[tuple[str, str]]:
+    """Yield a heading divided into a name and what may be its unit, the likeliest first."""
+    for match in _BRACKETS.finditer(text):
+        yield text[: match.start()] + text[match.end() :], match[1]
+    yield text, text if len(text) > 1 else ""
+    yield from ((text[: gap.start()], text[gap.end() :]) for gap in _BREAKS.finditer(text, 1))
+    first, *rest = plain(text).split() or [""]
+    if len(first) > 1 and rest and {*meanings_of(rest)} <= {"time", "plain"}:
+        yield text, first if spelling(first) in TIMES else ""  # "seconds_elapsed"
+    last = _LAST.fullmatch(text)
+    if last and last[1] and (last[2].isdigit() or meaning_of(last[2].lower()) in _FURTHER):
+        yield from ((f"{name} {last[2]}", unit) for name, unit in _splits(last[1]))
+
+
+@functools.cache
 def name_and_unit(header: str) -> tuple[str, str | None]:
     """Return name and unit of a heading; None without a unit.
 
-    >>> name_and_unit("Time (s)"), name_and_unit("t/ms"), name_and_unit("theta_rad")
-    (('Time', 's'), ('t', 'ms'), ('theta', 'rad'))
+    >>> name_and_unit("Time (s)"), name_and_unit("t/ms"), name_and_unit("Kąt_stopnie")
+    (('Time', 's'), ('t', 'ms'), ('Kąt', 'stopnie'))
     """
-    for pattern in (_IN_BRACKETS, _AFTER, _BEHIND):
-        match = pattern.match(header.strip())
-        if match and any(c.has(match["unit"]) for c in CHANNELS.values()):
-            return match["name"].strip(), match["unit"].strip()
-    match = _IN_BRACKETS.match(header.strip())
-    if match:  # an unknown unit is reported when it is needed
-        return match["name"].strip(), match["unit"].strip() or None
-    return header.strip(), None
+    text = header.translate(_SIGNS).strip()
+    if ":" in text and not _is_unit(text.rpartition(":")[2]):
+        text = text.rpartition(":")[2].strip() or text  # "Run 1: Time (s)"
+    for name, unit in _splits(text):
+        if _is_unit(unit):
+            return name.strip(), unit.strip()
+    bracket = re.search(r"[\(\[\{]([^()\[\]{}]+)[\)\]\}]$", text)
+    if bracket and "" in meanings_of(plain(bracket[1]).split() or [""]):
+        return text[: bracket.start()].strip(), bracket[1].strip()  # reported if it is needed
+    return text, None
+
+
+@dataclasses.dataclass(frozen=True)
+class Heading:
+    """Name and unit of a column, and what its words mean."""
+
+    name: str
+    unit: str | None
+    meanings: tuple[str, ...]  # the deciding one first; an empty one for unknown words
+
+    @classmethod
+    def of(cls, header: str) -> Heading:
+        """Return the meaning of a heading."""
+        name, unit = name_and_unit(header)
+        return cls(name, unit, tuple(meanings_of(plain(name).split())))
+
+    @property
+    def meaning(self) -> str:
+        """The deciding meaning; empty if no word is known."""
+        return self.meanings[0] if self.meanings else ""
+
+    def rank(self, channel: str) -> int | None:
+        """Return how well a heading fits a channel, 0 for best; None if it does not."""
+        kind, unit = CHANNELS[channel], spelling(self.unit or "")
+        if self.unit is not None and not kind.has(unit):
+            return None
+        unknown = "" in self.meanings
+        if self.meaning in kind.meanings and not (unknown and channel.startswith("pixel")):
+            return unknown + 2 * ("smooth" in self.meanings)
+        if channel not in {"time", "angle", "velocity"} or "error" in self.meanings:
+            return None
+        if self.meaning in OTHERS:
+            return 6 if unit in kind.units or {*kind.meanings} & {*self.meanings} else None
+        owners = [c for c in CHANNELS.values() if self.meaning in c.meanings]
+        free = not any(self.unit is None or c.has(unit) for c in owners)
+        if unit in kind.units and free and self.meaning not in _FIRM:
+            return 4
+        weak = self.meaning == "pendulum" and self.unit is None
+        return 5 - weak if channel == "angle" and free and (weak or unit in RAW) else None

@@ -69,7 +69,10 @@ def test_columns_are_read_by_names_and_units(tmp_path: Path, names: str) -> None
 
 @pytest.mark.parametrize(
     ("scale", "names", "says"),
-    [(1.0, "Zeit [min],Winkel [Umdr]", "no column of angles"), (3e9, NAMES, "too large")],
+    [
+        (1.0, "Zeit [min],Winkel [Bq]", "no column of angles: 'Bq' is not known"),
+        (3e9, NAMES, "too large"),
+    ],
 )
 def test_an_impossible_unit_is_refused(tmp_path: Path, scale: float, names: str, says: str) -> None:
     with pytest.raises(pendmap.InputError, match=says):
@@ -198,7 +201,9 @@ def test_only_ends_of_a_sensor_are_clipped(tmp_path: Path) -> None:
     assert "clipped" not in found(read(tmp_path, text((dense, drawn), form="%.4f")))
 
 
-@pytest.mark.parametrize(("gain", "gyroscope"), [(0.75, True), (1.5, False)])
+@pytest.mark.parametrize(
+    ("gain", "gyroscope"), [(0.75, True), (1.33, True), (0.75, False), (1.5, False)]
+)
 def test_a_gain_that_the_period_disproves_is_reported_with_its_error(
     tmp_path: Path, gain: float, *, gyroscope: bool
 ) -> None:
@@ -212,6 +217,7 @@ def test_a_gain_that_the_period_disproves_is_reported_with_its_error(
     words = found(read(tmp_path, content))["angle-scale"].text
     factor, error = re.search(r"angle is (\S+) \+- (\S+) times", words).groups()  # type: ignore[union-attr]
     assert abs(float(factor) - 1 / gain) < 3 * float(error)
+    assert float(words.split("gain is ")[1].split()[0]) == pytest.approx(gain, rel=0.01)
     assert float(error) < 0.01
     channel = "velocity" if gyroscope else "angle"
     described = f"{RUN}[columns]\n{channel} = {{ scale = {factor} }}\n"

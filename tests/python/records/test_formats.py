@@ -67,7 +67,7 @@ def test_a_file_of_tracker_is_read(tmp_path: Path, separator: str, decimal: str,
     run = read(tmp_path, head + rows((time, x, y), separator, decimal), "a.txt")
     assert np.sqrt(np.mean((run.theta - theta) ** 2)) < 0.004
     said = found(run)["angle-from-pixels"].text
-    assert float(said.split("radius ")[1].split(",")[0]) == pytest.approx(210, rel=0.01)
+    assert float(said.split("radius ")[1].split(" ")[0]) == pytest.approx(210, rel=0.01)
     assert pendmap.noise_floor(run).sigma == pytest.approx(0.3 / 210, rel=0.1)
 
 
