@@ -253,9 +253,7 @@ def _ordinal(parts: dict[str, str]) -> int:
     year, month, day = parts["y"], parts["m"].lower(), parts["d"]
     if len(year) not in {2, 4} or len(day) > 2 or (month.isdigit() and len(month) > 2):
         raise ValueError
-    number = (
-        int(month) if month.isdigit() else _MONTH[month[:4] if month[:4] in _MONTH else month[:3]]
-    )
+    number = int(month) if month.isdigit() else _MONTH.get(month[:4]) or _MONTH[month[:3]]
     return dt.date(int(year) + 2000 * (len(year) == 2), number, int(day)).toordinal()
 
 
@@ -267,8 +265,7 @@ def _seconds(key: tuple[str | None, ...], days: dict[str, int], *, short: bool) 
         hour = hour % 12 + 12 * (half in "pP")
     if short and parts[2] is None:
         hour, minute, second = 0, hour, minute
-    shift = re.fullmatch(r"([+-])(\d\d):?(\d\d)?", zone or "+00")
-    offset = (
-        0 if shift is None else int(shift[1] + "60") * (60 * int(shift[2]) + int(shift[3] or 0))
-    )
-    return _DAY_S * days.get(day or "", 0) + 3600 * hour + 60 * minute + second - offset
+    shift = re.fullmatch(r"([+-]\d\d):?(\d\d)?", zone or "+00")
+    hour -= int(shift[1]) if shift else 0
+    minute -= int(f"{zone[0]}{shift[2]}") if zone and shift and shift[2] else 0
+    return _DAY_S * days.get(day or "", 0) + 3600 * hour + 60 * minute + second

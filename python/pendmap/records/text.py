@@ -263,7 +263,7 @@ def _clocks(columns: list[Column], names: list[str]) -> tuple[int, ...]:
             dated.append(k)
     if day is not None:
         columns[day] = dataclasses.replace(columns[day], values=columns[day].values * np.nan)
-    moving = [k for k in dated if np.nanmax(columns[k].values) > 0]
+    moving = [k for k in dated if np.any(columns[k].values > 0)]
     if any(names) and moving and not timed and not any(is_known(names[k], "time") for k in moving):
         names[moving[0]] = TIME
     return tuple(dated)
