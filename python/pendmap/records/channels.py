@@ -177,7 +177,8 @@ def _example(places: Mapping[str, int], table: Table, where: str, *, timed: bool
     free = [k for k in columns if k != time and changes(table.values[:, k])]
     rough = {k: _roughness(table.values[:, k]) for k in free}
     angle = next((k for k in free if rough[k] <= 2 * min(rough.values())), None)
-    known: dict[str, int | None] = {c: places[c] for c in ("angle", "velocity") if c in places}
+    headed = ("angle", "velocity") if any(table.names) else ()
+    known: dict[str, int | None] = {c: places[c] for c in headed if c in places}
     given = {"time": time} | (known or {"angle": angle})
     numbers = {channel: place + 1 for channel, place in given.items() if place is not None}
     return by_hand(where, **({} if timed or "time" in numbers else {"rate_hz": 100}), **numbers)

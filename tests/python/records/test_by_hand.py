@@ -137,6 +137,7 @@ def test_an_invalid_value_is_refused_in_one_line(
     [
         (text((OTHER, TIME, THETA), "a,b,c"), {}),
         (text((OTHER, THETA), "a,b"), {}),
+        (text((0 * TIME, THETA), ""), {}),
         (text((TIME, OTHER, THETA), "t_s,a,b"), {}),
         (text((0 * TIME, TIME, THETA), "angle,t_s,theta_deg"), {}),
         (text((TIME, 1e6 * THETA), "t_s,theta_rad"), {}),
