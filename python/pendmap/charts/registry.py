@@ -222,10 +222,11 @@ def of_result(
         return build(dataset, layer=layer, cells=cells)
     module = importlib.import_module(f"pendmap.charts.{name}")
     made: Any = module.sheet(result)
-    if hasattr(module, "whole") and layer not in {None, *(panel.name for panel in made.panels)}:
-        whole: Sheet = module.whole(result)
-        if layer == ALL:
-            return whole
-        made = dataclasses.replace(whole, columns=[[made], *whole.columns])
+    whole = getattr(module, "whole", module.sheet)
+    if layer == ALL:
+        made, layer = whole(result), None
+    elif whole is not module.sheet and layer not in {None, *(one.name for one in made.panels)}:
+        every = whole(result)
+        made = dataclasses.replace(every, columns=[[made], *every.columns])
     shown: Chart | Sheet = made.only(layer)
     return shown

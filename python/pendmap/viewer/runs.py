@@ -58,7 +58,7 @@ class Motion:
 
 def contents(result: Any) -> dict[str, Any]:  # noqa: ANN401 (of several types)
     """Return layout, contents and name of the recording of what was found in records."""
-    shown = registry.of_result(result)
+    shown = registry.of_result(result, layer=registry.ALL)
     drawn, text, every = chart.drawings(shown), summary(result), motions(result)
     recording.refuse_late(shown.title, (one.time for one in every))
     tabs = [container(f"run_{k}", one) for k, one in enumerate(every, 1)]
