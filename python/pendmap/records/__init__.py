@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from pendmap.records.experiment import Experiment, Finding, Run, Segment
+from pendmap.records.experiment import Experiment, Run, Segment
 from pendmap.records.noise import NoiseFloor, noise_floor
 from pendmap.records.overrides import ByHand
 from pendmap.records.read import experiment_of, files_of, read_experiment
+from pendmap.tables.findings import Finding
 
 __all__ = [
     "ByHand",

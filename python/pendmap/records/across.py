@@ -15,15 +15,16 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.formatting import counted, moment
-from pendmap.records.experiment import finding_of
 from pendmap.records.scale import FAR_ZERO, middle_of, swings_of
 from pendmap.signal.robust import normal_scale
+from pendmap.tables.findings import finding_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from pendmap.records.experiment import Experiment, Finding, Run
+    from pendmap.records.experiment import Experiment, Run
     from pendmap.signal import Floats
+    from pendmap.tables.findings import Finding
 
 SPREADS: Final = 10.0  # Gap of two groups of periods, in their spreads, above which rigs differ
 ONE_RIG: Final = 0.05  # Relative difference of periods above which rigs differ at any spread

@@ -18,10 +18,10 @@ from pendmap.signal.half_cycles import swings
 from pendmap.signal.robust import normal_scale
 
 if TYPE_CHECKING:
-    from pendmap.records.experiment import Finding
     from pendmap.records.rod_sensors import Accelerometer
     from pendmap.records.work import Work
     from pendmap.signal import Floats
+    from pendmap.tables.findings import Finding
 
 WRAPPED_SPAN: Final = 1.01  # Greatest span of wrapped readings, turns: one turn and some noise
 WRAP_JUMP: Final = 0.75  # Least jump between neighbours that is a wrap, turns

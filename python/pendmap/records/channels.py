@@ -14,10 +14,11 @@ from pendmap.formatting import listed
 from pendmap.model.quantities import GRAVITY
 from pendmap.records.by_hand import by_hand
 from pendmap.records.description import Column
-from pendmap.records.experiment import finding_of
 from pendmap.records.guesses import ANGLE_CHANNELS, changes, guess, head_of, use_pixels
 from pendmap.records.rod_sensors import accelerometer_of
-from pendmap.records.units import (
+from pendmap.records.work import Work
+from pendmap.tables.findings import finding_of
+from pendmap.tables.units import (
     ANGLES,
     CHANNELS,
     LENGTHS,
@@ -28,15 +29,14 @@ from pendmap.records.units import (
     plain,
     spelling,
 )
-from pendmap.records.work import Work
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
 
     from pendmap.records.description import Description, RunPlan
-    from pendmap.records.experiment import Finding
-    from pendmap.records.text import Table
     from pendmap.signal import Floats
+    from pendmap.tables.findings import Finding
+    from pendmap.tables.text import Table
 
 _MOST_NAMED: Final = 8  # Most columns listed in a message
 MOTOR_UNITS: Final = ("nm", "mnm", "a", "ma")

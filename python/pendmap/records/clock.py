@@ -21,10 +21,10 @@ from pendmap.signal.local_polynomial import local_fit
 from pendmap.signal.robust import broad_scale, intervals_of
 
 if TYPE_CHECKING:
-    from pendmap.records.experiment import Finding
     from pendmap.records.work import Work
     from pendmap.signal import Floats, Indices, Stretch
     from pendmap.signal.local_polynomial import LocalFit
+    from pendmap.tables.findings import Finding
 
 RESTART: Final = 10  # Least decrease at a clock's restart, intervals; fewest samples of each part
 REPORTED_JITTER: Final = 0.02  # Relative spread of the intervals above which jitter is reported

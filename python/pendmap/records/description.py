@@ -19,7 +19,8 @@ from pendmap.errors import (
     short_repr,
     shown_key,
 )
-from pendmap.records.units import ANGULAR_ACCELERATIONS, CHANNELS, PIVOT_UNITS, spelling
+from pendmap.tables.text import Reader
+from pendmap.tables.units import ANGULAR_ACCELERATIONS, CHANNELS, PIVOT_UNITS, spelling
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -79,15 +80,6 @@ ONLY_OF: Final = {
 
 
 @dataclasses.dataclass(frozen=True)
-class Reader:
-    """Format of the files, as far as it cannot be inferred from them."""
-
-    delimiter: str | None = _key(str)
-    decimal: str | None = _key([".", ","])
-    skip_rows: int = _key(range(1_000_000), 0)
-
-
-@dataclasses.dataclass(frozen=True)
 class Drive:
     """Drive ``a(t) = p cos(Omega t + phi)``; a ``phi`` of None is fitted."""
 
@@ -136,7 +128,7 @@ class Description:
     known: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     columns: Mapping[str, Column] = dataclasses.field(default_factory=dict)
     rate_hz: float | None = None
-    reader: Reader = Reader()
+    reader: Reader = dataclasses.field(default_factory=Reader)
     runs: tuple[RunPlan, ...] = ()
 
 

@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.records.experiment import finding_of
-from pendmap.records.units import CHANNELS, Heading, spelling
+from pendmap.tables.findings import finding_of
+from pendmap.tables.units import CHANNELS, Heading, spelling
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from pendmap.records.description import Column
-    from pendmap.records.experiment import Finding
-    from pendmap.records.text import Table
     from pendmap.signal import Floats
+    from pendmap.tables.findings import Finding
+    from pendmap.tables.text import Table
 
 # Channels from which an angle can be computed
 ANGLE_CHANNELS: Final = ("angle", "velocity", "pixel_x", "pixel_y", "acceleration", "peaks")

@@ -19,9 +19,9 @@ from pendmap.signal.local_polynomial import local_fit
 from pendmap.signal.robust import between, normal_scale, stretches, widened
 
 if TYPE_CHECKING:
-    from pendmap.records.experiment import Finding
     from pendmap.records.work import Work
     from pendmap.signal import Stretch
+    from pendmap.tables.findings import Finding
 
 STILL_SPAN: Final = 8.0  # Range of readings below which there is no motion, over the noise
 FOLDED: Final = 0.97  # Reading over the gain, of an accelerometer, near a quarter turn

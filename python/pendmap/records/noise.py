@@ -23,10 +23,10 @@ from pendmap.signal.robust import broad_scale, widened
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from pendmap.records.experiment import Finding
     from pendmap.records.work import Work
     from pendmap.signal import Floats, Mask
     from pendmap.signal.local_polynomial import LocalFit
+    from pendmap.tables.findings import Finding
 
 SLOW_SAMPLING: Final = 0.06  # Phase between samples, rad, above which quartics leave motion
 WAY_PHASE: Final = 0.25  # Phase over which displacements are measured, rad, unless one interval

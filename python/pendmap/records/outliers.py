@@ -24,9 +24,9 @@ from pendmap.signal.local_polynomial import POINTS, local_fit
 from pendmap.signal.robust import broad_scale, normal_scale, widened
 
 if TYPE_CHECKING:
-    from pendmap.records.experiment import Finding
     from pendmap.records.work import Work
     from pendmap.signal import Floats, Indices, Mask
+    from pendmap.tables.findings import Finding
 
     Verdict = tuple[slice | Indices, Jump | None]
 

@@ -9,7 +9,7 @@ from pendmap.errors import InputError
 from pendmap.files import toml_text, whole_file
 from pendmap.records.by_hand import GIVEN, by_hand
 from pendmap.records.description import RATE
-from pendmap.records.units import CHANNELS, spelling
+from pendmap.tables.units import CHANNELS, spelling
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

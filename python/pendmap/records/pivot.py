@@ -16,9 +16,9 @@ from pendmap.signal.local_polynomial import local_fit
 from pendmap.signal.robust import even_times
 
 if TYPE_CHECKING:
-    from pendmap.records.experiment import Finding
     from pendmap.records.work import Work
     from pendmap.signal import Floats
+    from pendmap.tables.findings import Finding
 
 FARTHEST_PIVOT: Final = {"m": 3.0, "m/s": 60.0, "m/s2": 3000.0}  # Greatest plausible span by unit
 PIVOT_ORDER: Final = {"m": 2, "m/s": 1}  # Order of differentiation to an acceleration, by unit

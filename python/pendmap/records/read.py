@@ -16,15 +16,16 @@ from pendmap.records.across import checked_together
 from pendmap.records.by_hand import FRAME, GIVEN
 from pendmap.records.channels import channels_of
 from pendmap.records.description import NAME, Description, RunPlan, description_of
-from pendmap.records.experiment import Experiment, Finding, Run, finding_of
-from pendmap.records.formats import TABLES, read_table
-from pendmap.records.frames import frame_of
+from pendmap.records.experiment import Experiment, Run
 from pendmap.records.guesses import side_by_side
 from pendmap.records.overrides import ByHand, by_option, name_columns, override, refuse_unused
 from pendmap.records.rod_sensors import gyroscope_of
 from pendmap.records.rules import OF_RELEASE, RULES, apply
-from pendmap.records.tables import table_of
 from pendmap.records.work import Work
+from pendmap.tables.findings import Finding, finding_of
+from pendmap.tables.formats import TABLES, read_table
+from pendmap.tables.frames import frame_of
+from pendmap.tables.table import table_of
 
 if TYPE_CHECKING:
     from typing import Unpack
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from pendmap.records.overrides import Taken
-    from pendmap.records.text import Table
+    from pendmap.tables.text import Table
 
     Frame: TypeAlias = pd.DataFrame | pd.Series | xr.Dataset | xr.DataArray
     Records: TypeAlias = Experiment | Run | Frame | str | os.PathLike[str]

@@ -13,9 +13,9 @@ from pendmap.signal.half_cycles import after_turns, swings
 from pendmap.signal.robust import stretches
 
 if TYPE_CHECKING:
-    from pendmap.records.experiment import Finding
     from pendmap.records.work import Work
     from pendmap.signal import Floats, Indices, Stretch
+    from pendmap.tables.findings import Finding
 
 RELEASE_RISE: Final = 0.1  # Relative growth of a swing that only a hand causes
 LONG_HALF: Final = 1.4  # Duration of a half cycle, over the usual one, that only a hand causes

@@ -15,9 +15,9 @@ from pendmap.formatting import counted
 from pendmap.records.scale import GAIN_KNOWN, gain_of
 
 if TYPE_CHECKING:
-    from pendmap.records.experiment import Finding
     from pendmap.records.work import Work
     from pendmap.signal import Floats
+    from pendmap.tables.findings import Finding
 
 NYQUIST: Final = 2.0  # Fewest readings per period of the drive that resolve it
 LEAST_USED: Final = 0.1  # Share of readings in motion used by a fit below which a warning is given

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.records.units import ANGULAR_ACCELERATIONS, name_and_unit, plain, spelling
 from pendmap.signal.half_cycles import swings
+from pendmap.tables.units import ANGULAR_ACCELERATIONS, name_and_unit, plain, spelling
 
 if TYPE_CHECKING:
     from pendmap.records.description import Column, Direction

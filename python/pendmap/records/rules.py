@@ -26,8 +26,8 @@ from pendmap.records import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from pendmap.records.experiment import Finding
     from pendmap.records.work import Work
+    from pendmap.tables.findings import Finding
 
     Rules = Sequence[tuple[str, Callable[[Work], Finding | None]]]
 

@@ -18,9 +18,9 @@ from pendmap.records.resolution import step_of
 from pendmap.signal.robust import equal_runs
 
 if TYPE_CHECKING:
-    from pendmap.records.experiment import Finding
     from pendmap.records.work import Work
     from pendmap.signal import Floats, Indices
+    from pendmap.tables.findings import Finding
 
 EQUAL_READINGS: Final = 5  # Fewest consecutive equal readings that may be clipped or frozen
 FINEST: Final = 3e-5  # Step below which it is the last written digit, rad

@@ -16,14 +16,15 @@ import numpy as np
 from pendmap.errors import InputError
 from pendmap.model.quantities import GRAVITY
 from pendmap.records.by_hand import by_hand
-from pendmap.records.units import DEGREE
 from pendmap.signal.half_cycles import after_turns, swings
 from pendmap.signal.robust import Z95, normal_scale
+from pendmap.tables.units import DEGREE
 
 if TYPE_CHECKING:
-    from pendmap.records.experiment import Finding, Run
+    from pendmap.records.experiment import Run
     from pendmap.records.work import Work
     from pendmap.signal import Floats, Indices
+    from pendmap.tables.findings import Finding
 
 FEWEST_PERIODS: Final = 6  # Fewest periods that are analysed
 LEAST_GROWTH: Final = 1e-4  # Growth of the period, over a pendulum's, of readings that show none

@@ -15,8 +15,9 @@ from pendmap.records.samples import FINEST
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from pendmap.records.experiment import Experiment, Finding, Run
+    from pendmap.records.experiment import Experiment, Run
     from pendmap.records.noise import NoiseFloor
+    from pendmap.tables.findings import Finding
 
 # Findings of a wrong unit or scale, which makes results wrong unless corrected
 UNIT_FINDINGS: Final = frozenset(("angle-scale", "angle-unit", "pivot-unit", "time-unit"))

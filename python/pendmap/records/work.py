@@ -11,7 +11,7 @@ import numpy as np
 from pendmap.errors import InputError
 from pendmap.formatting import counted, listed
 from pendmap.records.by_hand import by_hand
-from pendmap.records.experiment import finding_of
+from pendmap.tables.findings import finding_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -19,9 +19,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from pendmap.records.description import RunPlan
-    from pendmap.records.experiment import Finding, Segment
+    from pendmap.records.experiment import Segment
     from pendmap.records.rod_sensors import Accelerometer
     from pendmap.signal import Floats, Indices, Mask, Stretch
+    from pendmap.tables.findings import Finding
 
 FEWEST_SAMPLES = 5  # Fewest samples of a record
 _FEWEST_PEAKS = 3  # Fewest samples of a record of turning points

@@ -19,7 +19,7 @@ from pyarrow import parquet
 
 import pendmap
 from pendmap import Axis, Grid, InputError, Pendulum, virtual_rig
-from pendmap.records.tables import MOST_COLUMNS
+from pendmap.tables.table import MOST_COLUMNS
 
 if TYPE_CHECKING:
     from collections.abc import Callable

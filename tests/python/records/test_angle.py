@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import pendmap
-from pendmap.records.experiment import texts
+from pendmap.tables.findings import texts
 from recorded import COUNT, clean, experiment, found, motion, noisy, read, text
 
 TIME, THETA = clean()

@@ -23,9 +23,9 @@ from pendmap.identification.sensitivity import upper_limit
 from pendmap.identification.turning import TooShortError, rough_start, swinging
 from pendmap.model import Rig
 from pendmap.model.effects import Effect
-from pendmap.records.experiment import texts
 from pendmap.signal.half_cycles import swings
 from pendmap.signal.robust import span
+from pendmap.tables.findings import texts
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence

@@ -9,13 +9,13 @@ import zipfile
 from typing import TYPE_CHECKING, Final
 
 from pendmap.errors import InputError
-from pendmap.records.experiment import finding_of
+from pendmap.tables.findings import finding_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
     from xml.etree import ElementTree as ET
 
-    from pendmap.records.experiment import Finding
+    from pendmap.tables.findings import Finding
 
 MOST_CELLS: Final = 5_000_000  # Most cells of a sheet; a row has one more
 _MOST_ROWS: Final = 2**20  # Rows that Excel has

@@ -25,7 +25,7 @@ PIVOT_UNITS: Final = {
     "mm": ("m", 1e-3),
 }
 _TABLES: Final[dict[str, Any]] = tomllib.loads(
-    resources.files("pendmap.records").joinpath("words.toml").read_text("utf-8")
+    resources.files("pendmap.tables").joinpath("words.toml").read_text("utf-8")
 )
 TIMES: Final[dict[str, float]] = {name: row[0] for name, row in _TABLES["time"].items()}
 ANGLES: Final[dict[str, float]] = {name: row[0] for name, row in _TABLES["angle"].items()}

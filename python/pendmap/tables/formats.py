@@ -12,24 +12,24 @@ from typing import TYPE_CHECKING, Final
 from pendmap.errors import InputError
 from pendmap.files import read_whole
 from pendmap.formatting import listed
-from pendmap.records.experiment import finding_of
-from pendmap.records.guesses import ANGLE_CHANNELS, guess
-from pendmap.records.matlab import matlab_frame
-from pendmap.records.tables import MOST_BYTES, decoded, refuse_large, table_of
-from pendmap.records.text import parsed
-from pendmap.records.tracker import TRACKER, tracker_frame
-from pendmap.records.workbooks import is_workbook, sheet_text
+from pendmap.tables.findings import finding_of
+from pendmap.tables.matlab import matlab_frame
+from pendmap.tables.table import MOST_BYTES, decoded, refuse_large, table_of
+from pendmap.tables.text import parsed
+from pendmap.tables.tracker import TRACKER, tracker_frame
+from pendmap.tables.units import Heading
+from pendmap.tables.workbooks import is_workbook, sheet_text
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from pendmap.records.description import Reader
-    from pendmap.records.text import Table
+    from pendmap.tables.text import Reader, Table
 
 _TEXTS: Final = (".csv", ".tsv", ".txt", ".dat")
 _BINARY: Final = (".parquet", ".pq", ".xlsx", ".ods", ".mat", ".trk", ".trz", ".zip")
 # Suffixes of the files that are records in a folder without a description
 TABLES: Final = (*_TEXTS, *_BINARY)
+_ANGLES: Final = ("angle", "velocity", "pixel_x", "acceleration")  # Wanted, best first
 _ZIP: Final = b"PK\x03\x04"
 _MOST_MEMBERS: Final = 200  # Most members of an archive
 _OTHERS: Final = {
@@ -87,10 +87,10 @@ def _member(data: bytes, reader: Reader, where: str) -> Table:
             except Exception as error:  # noqa: BLE001 (whatever a damaged file makes of a reader)
                 refused = refused or f", the first refused: {error}"
                 continue
-            places: dict[str, int] = {}
-            guess(table, places, timed=True)
-            angles = [k for k, channel in enumerate(ANGLE_CHANNELS) if channel in places]
-            rank = min(angles) if angles and "time" in places else len(ANGLE_CHANNELS)
+            heads = [Heading.of(head) for head in table.names]
+            good = {c for c in (*_ANGLES, "time") for head in heads if head.rank(c) is not None}
+            angles = [k for k, channel in enumerate(_ANGLES) if channel in good]
+            rank = min(angles) if angles and "time" in good else len(_ANGLES)
             tables.append(((rank, -table.rows.size), name, table))
     if not tables:
         raise InputError(f"{where}: must contain a table of numbers, got none{refused}")

@@ -8,14 +8,14 @@ from xml.etree import ElementTree as ET
 
 from pendmap.errors import InputError
 from pendmap.formatting import listed
-from pendmap.records.experiment import finding_of
+from pendmap.tables.findings import finding_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     import pandas as pd
 
-    from pendmap.records.experiment import Finding
+    from pendmap.tables.findings import Finding
 
 TRACKER: Final = b"org.opensourcephysics.cabrillo.tracker.TrackerPanel"
 _MASS: Final = "org.opensourcephysics.cabrillo.tracker.PointMass"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pendmap.errors import InputError
-from pendmap.records.units import name_and_unit
+from pendmap.tables.units import name_and_unit
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -9,13 +9,13 @@ import numpy as np
 
 from pendmap.errors import InputError
 from pendmap.formatting import counted
-from pendmap.records.experiment import finding_of
-from pendmap.records.text import MOST_COLUMNS, TIME, Table
+from pendmap.tables.findings import finding_of
+from pendmap.tables.text import MOST_COLUMNS, TIME, Table
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from pendmap.records.experiment import Finding
+    from pendmap.tables.findings import Finding
 
 MOST_BYTES: Final = 2**30  # Largest file, and largest table in memory, bytes
 MOST_CONTROLS: Final = 0.02  # Share of control characters above which a file is no text

@@ -12,23 +12,22 @@ import dataclasses
 import itertools
 import re
 from collections import Counter, defaultdict
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from pendmap.errors import InputError, short_repr
 from pendmap.formatting import counted, listed
-from pendmap.records.cells import column_of, counted_since, split, unwrapped, weight
-from pendmap.records.experiment import finding_of
-from pendmap.records.units import CHANNELS, Heading, name_and_unit, spelling
+from pendmap.tables.cells import column_of, counted_since, split, unwrapped, weight
+from pendmap.tables.findings import finding_of
+from pendmap.tables.units import CHANNELS, Heading, name_and_unit, spelling
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from pendmap.records.cells import Column
-    from pendmap.records.description import Reader
-    from pendmap.records.experiment import Finding
     from pendmap.signal import Floats, Indices
+    from pendmap.tables.cells import Column
+    from pendmap.tables.findings import Finding
 
 MOST_COLUMNS: Final = 1000  # Most columns of a table
 LONGEST_LINE: Final = 40 * MOST_COLUMNS  # Longest line that may be a row, characters
@@ -60,6 +59,20 @@ _ABOVE: Final = 12  # Most lines above the rows that may hold names
 _BLANKS: Final = "\u00a0\u2009\u202f"
 _SET: Final = re.compile(f"(?<=[0-9])[{_BLANKS}](?=[0-9]{{3}}(?![0-9]))")  # of thousands
 _SIGNS: Final = str.maketrans(f"\u2212\u2013{_BLANKS}\uff0c\uff1b\uff1a\uff08\uff09", "--   ,;:()")
+
+
+def _key(rule: object, default: object = None) -> Any:  # noqa: ANN401 (of any type)
+    """Return a field whose value in ``experiment.toml`` follows a rule."""
+    return dataclasses.field(default=default, metadata={"rule": rule})
+
+
+@dataclasses.dataclass(frozen=True)
+class Reader:
+    """Format of the files, as far as it cannot be inferred from them."""
+
+    delimiter: str | None = _key(str)
+    decimal: str | None = _key([".", ","])
+    skip_rows: int = _key(range(1_000_000), 0)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -1,0 +1,1 @@
+"""Tables of numbers with names and units, from files and from memory."""
