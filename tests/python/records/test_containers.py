@@ -12,7 +12,7 @@ import pytest
 from scipy.io import savemat
 
 import pendmap
-from pendmap.records import formats
+from pendmap.tables import formats
 from recorded import clean, found, text
 
 if TYPE_CHECKING:
