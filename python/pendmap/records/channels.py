@@ -60,6 +60,8 @@ def channels_of(  # noqa: C901 (a step each)
         if channel in places or kind.default not in table.names:
             continue
         place = table.names.index(kind.default)
+        if not np.isfinite(table.values[:, place]).any():
+            continue  # another column has the readings
         # [columns] may say that theta_rad holds turning points: then it holds no angles.
         if channel != "angle" or place != places.get("peaks"):
             places[channel] = place
