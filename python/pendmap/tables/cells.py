@@ -168,7 +168,7 @@ def clock_of(cells: pd.Series[str]) -> tuple[Floats, str] | None:
     good = forms == form
     day, clock, point, ms, half, zone = (parts.loc[good, name] for name in _CLOCK.groupindex)
     short, point = clock.str.count(":") == 1, point.fillna(ms)
-    if zone.nunique() > 1 or (short.any() and (form > 1 or point.isna().all())):
+    if len(zone.unique()) > 1 or (short.any() and (form > 1 or point.isna().all())):
         return None
     since = pd.to_timedelta(clock.mask(short, "0:" + clock) + "." + point.fillna("0"))
     noon = pd.Timedelta(hours=12)

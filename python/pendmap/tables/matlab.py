@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.errors import InputError
+from pendmap.tables.table import readable
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -31,7 +32,7 @@ def matlab_frame(data: bytes, where: str, most: int) -> pd.DataFrame:
     """
     import pandas as pd
 
-    try:
+    with readable(where, "MATLAB file"):
         if data.startswith(b"MATLAB 7.3"):
             import h5py
 
@@ -43,10 +44,6 @@ def matlab_frame(data: bytes, where: str, most: int) -> pd.DataFrame:
             _refuse_bomb(data, where, most)
             content = loadmat(io.BytesIO(data), simplify_cells=True)
             vectors = dict(_vectors("", {k: v for k, v in content.items() if k[:2] != "__"}))
-    except InputError:
-        raise
-    except Exception as error:  # noqa: BLE001 (whatever a damaged file makes of the reader)
-        raise InputError(f"{where}: is no MATLAB file that can be read: {error}") from None
     sizes = [values.size for values in vectors.values()]
     if not sizes:
         raise InputError(f"{where}: must have vectors of {_FEWEST} numbers or more: {_SAVE}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 from typing import TYPE_CHECKING, Final
 
@@ -13,6 +14,8 @@ from pendmap.tables.findings import finding_of
 from pendmap.tables.text import MOST_COLUMNS, TIME, Table
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     import pandas as pd
 
     from pendmap.tables.findings import Finding
@@ -22,6 +25,19 @@ MOST_CONTROLS: Final = 0.02  # Share of control characters above which a file is
 MOST_NULS: Final = 0.2  # Share of NUL bytes above which a file is no text
 _CHINESE: Final = re.compile(rb"(?:[\x00-\x7f]++|[\xa1-\xd7][\xa1-\xff])*+")  # of GB 2312
 _CONTROLS: Final = re.compile(r"[\x01-\x08\x0b\x0e-\x1f\x7f]")
+
+
+@contextlib.contextmanager
+def readable(where: str, kind: str, missing: str = "") -> Iterator[None]:
+    """Raise InputError for whatever a damaged file, or a missing package, makes of a reader."""
+    try:
+        yield
+    except InputError:
+        raise
+    except ImportError:
+        raise InputError(f"{where}: {missing}") from None
+    except Exception as error:  # noqa: BLE001 (readers raise many kinds)
+        raise InputError(f"{where}: is no {kind} that can be read: {error}") from None
 
 
 def table_of(frame: pd.DataFrame, where: str) -> Table:

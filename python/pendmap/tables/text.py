@@ -49,7 +49,7 @@ _LETTER: Final = re.compile(r"[^\W\d_]")
 _UNIT: Final = re.compile(r"[(\[]?\s*[^\d\s]{0,8}\d?\s*[)\]]?")
 _ABOVE: Final = 12  # Most lines above the rows that may hold names
 _SET: Final = re.compile(r"(?<=[0-9])[\u00a0\u2009\u202f](?=[0-9]{3}(?![0-9]))")  # of thousands
-_SIGNS: Final = str.maketrans("\u2212\u2013\u00a0\u2009\u202f，；：（）", "--   ,;:()")  # noqa: RUF001
+_SIGNS: Final = str.maketrans("\u2212\u2013\u00a0\u2009\u202f，；：（）", "--   ,;:()")
 
 
 def _key(rule: object, default: object = None) -> Any:  # noqa: ANN401 (of any type)

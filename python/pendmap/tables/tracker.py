@@ -10,6 +10,7 @@ from xml.etree import ElementTree as ET
 from pendmap.errors import InputError
 from pendmap.formatting import listed
 from pendmap.tables.findings import finding_of
+from pendmap.tables.table import readable
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -31,7 +32,7 @@ def tracker_frame(data: bytes, where: str) -> tuple[pd.DataFrame, tuple[Finding,
     """
     import pandas as pd
 
-    try:
+    with readable(where, "project of Tracker"):
         project = ET.fromstring(data)  # noqa: S314 (expat limits the growth of entities)
         interval = 1e-3 * float(_text(project, "delta_t", "nan"))
         start = 1e-3 * float(_text(project, "starttime", "0"))
@@ -39,8 +40,6 @@ def tracker_frame(data: bytes, where: str) -> tuple[pd.DataFrame, tuple[Finding,
         axes = _frames(project, f"{_NAMED.format('coords')}/object")
         masses = project.iterfind(f".//object[@class='{_MASS}']")
         marks = {_text(mass, "name", "?"): _frames(mass, ".") for mass in masses}
-    except (ET.ParseError, ValueError) as error:
-        raise InputError(f"{where}: is no project of Tracker that can be read: {error}") from None
     name = max(marks, key=lambda mass: len(marks[mass]), default="")
     if not marks or not marks[name] or not axes or not interval > 0:
         raise InputError(

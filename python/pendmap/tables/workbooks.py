@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 from pendmap.errors import InputError
 from pendmap.tables.findings import finding_of
+from pendmap.tables.table import readable, refuse_large
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -18,6 +19,9 @@ if TYPE_CHECKING:
     from pendmap.tables.findings import Finding
 
 MOST_CELLS: Final = 5_000_000  # Most cells of a sheet; a row has one more
+_MISSING: Final = (
+    "an Excel file must be read with openpyxl: pip install pendmap[excel]; or saved as CSV"
+)
 _MOST_ROWS: Final = 2**20  # Rows that Excel has
 _NUMBERS: Final = (int, float, dt.datetime, dt.time, dt.timedelta)
 _TABLE: Final = "{urn:oasis:names:tc:opendocument:xmlns:table:1.0}"
@@ -28,44 +32,28 @@ _MOST_COLUMNS: Final = 2**14  # Columns that Excel has
 
 def is_workbook(data: bytes, where: str) -> bool:
     """Return whether a zip archive is a workbook."""
-    try:
+    with readable(where, "Excel or zip file"):
         names = zipfile.ZipFile(io.BytesIO(data)).namelist()
-    except zipfile.BadZipFile as error:
-        raise InputError(f"{where}: is no Excel or zip file that can be read: {error}") from None
     return "[Content_Types].xml" in names or {"mimetype", _CONTENT} <= set(names)
 
 
-def sheet_text(data: bytes, where: str, most: int) -> tuple[str, int, list[Finding]]:
-    """Return the sheet with the most numbers as text with tabs, its columns, and findings."""
-    try:
+def sheet_text(data: bytes, where: str) -> tuple[str, list[Finding]]:
+    """Return the sheet with the most numbers as text with tabs, and findings."""
+    sheets: dict[str, list[Sequence[object]]] = {}
+    count = 0
+    with readable(where, "workbook", _MISSING):
         with zipfile.ZipFile(io.BytesIO(data)) as packed:
             names = packed.namelist()
-            size = sum(part.file_size for part in packed.infolist())
-        if size > most:
-            most, size = most // 2**20, size // 2**20
-            raise InputError(  # noqa: TRY301 (passed on below)
-                f"{where}: unpacks to {size} MiB: must be at most {most} MiB"
-            )
-        sheets: dict[str, list[Sequence[object]]] = {}
-        count = 0
+            refuse_large(where, size=sum(part.file_size for part in packed.infolist()))
         for name, rows in _open_document(data) if _CONTENT in names else _excel(data):
             sheets[name] = []
             for row in map(_filled, rows):
                 sheets[name].append(row)
                 count += len(row) + 1
                 if count > MOST_CELLS:
-                    raise InputError(  # noqa: TRY301 (passed on below)
+                    raise InputError(
                         f"{where}: must have at most {MOST_CELLS} cells, got more: save it as CSV"
                     )
-    except InputError:
-        raise
-    except ImportError:
-        raise InputError(
-            f"{where}: an Excel file must be read with openpyxl: pip install pendmap[excel]; or"
-            " saved as CSV"
-        ) from None
-    except Exception as error:  # noqa: BLE001 (whatever a damaged file makes of the reader)
-        raise InputError(f"{where}: is no workbook that can be read: {error}") from None
     numbers = {
         name: sum(isinstance(cell, _NUMBERS) for row in rows for cell in row)
         for name, rows in sheets.items()
@@ -75,17 +63,20 @@ def sheet_text(data: bytes, where: str, most: int) -> tuple[str, int, list[Findi
     name = max(numbers, key=numbers.__getitem__)
     rows = sheets[name]
     filled = sorted({k for row in rows for k, cell in enumerate(row) if cell is not None})
+    refuse_large(where, columns=len(filled))
     lines = ("\t".join(_text(row[k]) if k < len(row) else "" for k in filled) for row in rows)
     chosen = finding_of("sheet-chosen", number=len(sheets), sheet=name)
     findings = [chosen] if len(sheets) > 1 else []
-    return "\n".join(lines) + "\n", len(filled), findings
+    return "\n".join(lines) + "\n", findings
 
 
 def _excel(data: bytes) -> Iterator[tuple[str, Iterable[Sequence[object]]]]:
     """Yield the name and the rows of each sheet of an ``.xlsx`` file."""
     import openpyxl
 
-    for sheet in openpyxl.load_workbook(io.BytesIO(data), read_only=True, data_only=True).worksheets:
+    for sheet in openpyxl.load_workbook(
+        io.BytesIO(data), read_only=True, data_only=True
+    ).worksheets:
         sheet.reset_dimensions()  # loggers write wrong ones
         yield sheet.title, sheet.iter_rows(max_row=_MOST_ROWS, values_only=True)
 
@@ -97,8 +88,9 @@ def _open_document(data: bytes) -> Iterator[tuple[str, Iterable[Sequence[object]
     with zipfile.ZipFile(io.BytesIO(data)) as packed:
         root = ET.fromstring(packed.read(_CONTENT))  # noqa: S314 (expat limits entities)
     for sheet in root.iter(f"{_TABLE}table"):
-        yield sheet.get(f"{_TABLE}name", "?"), itertools.chain.from_iterable(
-            map(_repeated, sheet.iter(f"{_TABLE}table-row"))
+        yield (
+            sheet.get(f"{_TABLE}name", "?"),
+            itertools.chain.from_iterable(map(_repeated, sheet.iter(f"{_TABLE}table-row"))),
         )
 
 
