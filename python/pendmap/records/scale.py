@@ -256,9 +256,10 @@ def curvature(work: Work) -> Finding | None:
     if largest > LARGEST_SWING or np.ptp(grown) < 2e-3:
         return None
     low, high = gain_interval(periods)
-    if low <= 1 + GAIN_KNOWN and high >= 1 - GAIN_KNOWN:
-        return None
     share, error = share_of(periods, grown)
+    unknown = Z95 * error > 2 * GAIN_KNOWN  # the gain is the root of the share
+    if unknown or (low <= 1 + GAIN_KNOWN and high >= 1 - GAIN_KNOWN):
+        return None
     factor, spread = factor_of(periods, share)
     return work.finding(
         "angle-unit.flat" if share < 0.1 else "angle-scale",
