@@ -25,10 +25,8 @@ GAIN_KNOWN: Final = 0.1  # Half-width of the gain's 95 % interval above which it
 LEFT_OUT: Final = 0.1  # Share of readings in motion that a fit may leave out without a warning
 MOVING: Final = ("motion", "driven", "handled")  # Segments that may belong to a decay
 # Findings that leave readings in motion out
-LEAVES_OUT: Final = tuple(
-    "acceleration-folded braked-end clipped driven-start frozen missed-counts outliers"
-    " several-releases trigger-release".split()
-)
+REASONS: Final = ["acceleration-folded", "braked-end", "clipped", "driven-start", "frozen"]
+LEAVES_OUT: Final = [*REASONS, "missed-counts", "outliers", "several-releases", "trigger-release"]
 ON_STEPS: Final = 0.12  # Greatest rms distance from multiples of a step, in steps; chance: 0.29
 EDGE_SHARE: Final = 0.95  # Share of single-count steps above which a record is a log of edges
 FEWEST_EDGES: Final = 50  # Fewest readings from which edges are recognized

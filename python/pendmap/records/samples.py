@@ -114,7 +114,7 @@ def _abrupt(work: Work, low: int, high: int) -> bool:
     ]
     missed = min(slopes, default=-math.inf) * float(work.time[high - 1] - work.time[low]) / 4
     noise = float(np.median(np.abs(np.diff(work.theta, 2)))) if work.theta.size > 2 else 0.0
-    # The extreme of a parabola is half of this above its ends; counts hide one of it, friction more.
+    # The extreme of a parabola is half of this above its ends: a count, and more by friction.
     return missed > 4 * work.count + 3 * min(noise, 0.01)
 
 
