@@ -1,4 +1,4 @@
-"""Motions that are not free: a driven start, a braked end, a push; what is left out is said first."""
+"""Motions that are not free: a driven start, a braked end, a push; what is said of them."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def test_a_fall_whose_fit_does_not_converge_is_used_from_where_it_left_upright(
 ) -> None:
     rig = pendmap.Rig(w0=W0, c_over_m=0.05, Tr=0.05)
     time = TIME[:1000]
-    fall = pendmap.simulate(rig, theta=3.12, velocity=0.0, t_eval=time).theta.values
+    fall = pendmap.simulate(rig, theta=3.12, velocity=0.0, t_eval=time).theta.to_numpy()
     there = pendmap.read_experiment(pd.DataFrame({"t_s": time, "theta_rad": noisy(fall, 0.002)}))
     fitted = trajectory._fitted
 
