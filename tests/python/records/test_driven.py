@@ -115,14 +115,14 @@ def test_a_fall_whose_fit_does_not_converge_is_used_from_where_it_left_upright(
     time = TIME[:1000]
     fall = pendmap.simulate(rig, theta=3.12, velocity=0.0, t_eval=time).theta.to_numpy()
     there = pendmap.read_experiment(pd.DataFrame({"t_s": time, "theta_rad": noisy(fall, 0.002)}))
-    fitted = trajectory._fitted
+    fitted = trajectory.fit_trusted
 
     def astray(runs: tuple[pendmap.Run, ...], *choices: object) -> trajectory.JointFit:
         joint = fitted(runs, *choices)
         lost = dataclasses.replace(joint.fit, converged=not runs[0].trusted[0])
         return dataclasses.replace(joint, fit=lost)
 
-    monkeypatch.setattr(trajectory, "_fitted", astray)
+    monkeypatch.setattr(trajectory, "fit_trusted", astray)
     report = pendmap.identify(there, methods=["trajectory"])
     (run,) = report.runs
     assert not run.trusted[np.abs(run.theta) > np.pi - 0.3].any()

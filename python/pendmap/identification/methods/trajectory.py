@@ -217,11 +217,11 @@ def fit_together(
     The choices are those of :func:`fit_from_start`. Where the search does not converge, runs are
     used from where they leave the upright position, near which every error grows.
     """
-    joint = _fitted(runs, start, held, effects)
+    joint = fit_trusted(runs, start, held, effects)
     later = [_from_upright(run) for run in runs]
     if joint.fit.converged or all(run is cut for run, cut in zip(runs, later, strict=True)):
         return joint
-    again = _fitted(later, start, held, effects)
+    again = fit_trusted(later, start, held, effects)
     return again if again.fit.converged else joint
 
 
@@ -240,7 +240,7 @@ def _from_upright(run: Run) -> Run:
     return dataclasses.replace(run, trusted=run.trusted & after, findings=(*run.findings, finding))
 
 
-def _fitted(
+def fit_trusted(
     runs: Sequence[Run],
     start: Rig | Mapping[str, float] | None,
     held: Collection[str],
