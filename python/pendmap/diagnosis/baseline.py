@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.diagnosis.candidates import CORE, Candidate
+from pendmap.diagnosis.candidates import CORE, ZERO, Candidate
 from pendmap.diagnosis.fitted_model import (
     FittedModel,
     converge,
@@ -53,7 +53,9 @@ def fit_baseline(
         free = ["w0", "c_over_m", "Tr"]
         first = _start(data)
         base = _through_all(data, first, free) or fit_model(data, first, free)
-    added = [c for c in map(Candidate, CORE) if c.name not in {*base.taken, *without}]
+    rates = all(run.rod_sensor is not None for run in data.fitted)
+    known = {*base.taken, *without, *([ZERO] if rates else [])}  # a rate has no zero of the angle
+    added = [candidate for candidate in map(Candidate, CORE) if candidate.name not in known]
     if not added:
         return base, None
     start = {candidate.free[0]: 0.0 for candidate in added}
@@ -114,7 +116,7 @@ def _start(data: DataSplit) -> Rig:
     free = [(run, k) for run, k in free if not run.forced]
     for run, k in sorted(free, key=lambda pair: -float(np.ptp(pair[0].time))):
         good = run.counted
-        rough = rough_start(run.time[good], run.theta[good], data.readings[k].sigma)
+        rough = rough_start(run.time[good], run.angle[good], data.readings[k].sigma)
         if rough is not None:
             return Rig(
                 w0=known or rough["w0"],
