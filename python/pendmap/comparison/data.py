@@ -29,11 +29,14 @@ KNOWN: Final = 0.1
 """Relative standard error of the noise above which a record is too short to estimate it."""
 FINEST: Final = 1e-7
 """Lower bound on the noise, rad, below that of any sensor; covers errors of local polynomials."""
-BLOCKS: Final = 50
-"""Fewest blocks in a swing or turn, so that noise and motion are separate in the spectrum."""
+BLOCKS: Final = (24, 50)
+"""Fewest blocks in a swing or turn, so that noise and motion are separate in the spectrum; and
+those whose means are exact enough for any noise."""
+SHARE: Final = 0.1  # Error of a block's mean over its noise, up to which fewer blocks are taken
+MOST: Final = 30_000  # Most readings that are fitted; of more, every second or further one is
 FEWEST_BLOCKS: Final = 1000
 """Fewest blocks of a record; with fewer readings the integrator's own steps dominate the cost."""
-LEAST_OF_BLOCK: Final = 3  # Fewest readings of a block
+LEAST_OF_BLOCK: Final = 2  # Fewest readings of a block
 OF_ACCELERATION: Final = "computed from an acceleration, whose own errors are not among the effects"
 NEIGHBOURS: Final = 2  # Blocks on either side to which a parabola is fitted
 
@@ -62,8 +65,12 @@ class DataSplit:
     def floors(self) -> tuple[float, ...]:
         """Share of rounding (white, variance ``count^2 / 12``) in each fitted run's noise."""
         pairs = zip(self.fitted_of, self.fitted, strict=True)
+        # The rounding of a block's mean is that of one reading over the number of readings.
         return tuple(
-            self.readings[k].count ** 2 / 12 / float(np.mean(np.square(run.sigma)))
+            self.readings[k].count ** 2
+            / 12
+            / float(np.mean(np.square(run.sigma)))
+            / max(self.runs[k].time.size // run.time.size, 1)
             for k, run in pairs
         )
 
@@ -100,6 +107,8 @@ def split_records(experiment: Experiment) -> DataSplit:
         average_blocks(as_fit_run(run, reading))
         for run, reading in zip(runs, readings, strict=True)
     ]
+    step = math.ceil(sum(run.time.size for run in every) / MOST)
+    every = [samples_of(run, slice(None, None, step)) if step > 1 else run for run in every]
     marked = [k for k, run in enumerate(runs) if run.hold_out] or _middle_runs(every)
     if not marked:
         return _hold_stretches(experiment, runs, readings, every)
@@ -200,11 +209,9 @@ def average_blocks(run: FitRun) -> FitRun:
     With weights ``w``, one over the squared errors, ``sum(w x)/sum(w)`` at the mean time has the
     error ``sum(w)^(-1/2)``. The bias ``var(t) a/2``, with the acceleration ``a`` of the parabola
     through five blocks, is subtracted; the remaining error, of order ``T^4/60`` times the fourth
-    derivative in a block of length ``T``, is ``1e-6`` of a swing. Counts, which give intervals of
-    the angle, are not averaged.
+    derivative in a block of length ``T``, is ``4e-6`` of a swing, or a tenth of the mean's noise. Rounding to counts of ``q`` has
+    the error ``q / sqrt(12)``, that of the mean of a ramp over ``m`` counts ``q / (m sqrt(120))``.
     """
-    if run.count is not None:
-        return run
     weights = np.where(run.counted, run.sigmas**-2.0, 0.0)
     for size in range(run.time.size // FEWEST_BLOCKS, LEAST_OF_BLOCK - 1, -1):
         angles = _block_means(run.time, run.angle, weights, size)
@@ -218,7 +225,11 @@ def average_blocks(run: FitRun) -> FitRun:
     known = np.where(good, theta, np.interp(time, time[good], theta[good]))
     theta = theta - 0.5 * variance * _curvature(time, known)
     sigma = np.where(good, weight, np.median(weight[good])) ** -0.5
-    means = dataclasses.replace(run, time=time, theta=theta, sigma=sigma, trusted=good)
+    if run.count is not None:
+        parts = run.theta[: time.size * size].reshape(-1, size)
+        passed = math.sqrt(10) * (np.ptp(parts, axis=1) / run.count - 1)
+        sigma = np.hypot(sigma, run.count / math.sqrt(12) / np.clip(passed, 1, math.sqrt(size)))
+    means = dataclasses.replace(run, time=time, theta=theta, sigma=sigma, trusted=good, count=None)
     return _with_angle(means, lambda _: angles[1])
 
 
@@ -248,7 +259,11 @@ def _dense(time: Floats, theta: Floats, weight: Floats) -> bool:
     velocity = np.diff(theta) / steps
     # Angular frequency of swings, or of rotations.
     rate = max(float(np.std(velocity) / np.std(theta)), float(np.quantile(np.abs(velocity), 0.99)))
-    return float(np.median(steps)) * rate < math.tau / BLOCKS
+    swing = min(math.sqrt(2) * float(np.std(theta)), 1.0)
+    noise = float(np.median(weight[weight > 0])) ** -0.5
+    most, safe = (math.tau / blocks for blocks in BLOCKS)
+    exact = (60 * SHARE * noise / swing) ** 0.25
+    return float(np.median(steps)) * rate < min(max(safe, exact), most)
 
 
 def _curvature(time: Floats, theta: Floats) -> Floats:

@@ -114,6 +114,7 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
     state.moved = lambda: moved(1, 1)
     with _refuse_divergence(experiment):
         last = search(state, core)
+        last = last if last.chosen or max_effects == 0 else state.physical_core(core) or last
         begin = state.scored(state.begun)
         if not doubt_keys(experiment, *data.runs) & UNIT_FINDINGS:
             refuse_astray(experiment.path, data.fitted, last.fit)

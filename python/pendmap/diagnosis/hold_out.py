@@ -38,7 +38,11 @@ def evaluate_hold_out(data: DataSplit, fitted: FittedModel) -> HoldOut:
     motion, without any step of a fit.
     """
     model, free = fitted.fit.model, fitted.free
-    known = {name: value for name, value in fitted.start.items() if "[" not in name and name not in SENSOR}
+    known = {
+        name: value
+        for name, value in fitted.start.items()
+        if "[" not in name and name not in SENSOR
+    }
     if not any(run.drive for run in data.held):
         # Effects of the drive do not act without a harmonic drive.
         drives = {e.name for e in model.effects if e.drives}

@@ -21,6 +21,7 @@ from pendmap.diagnosis.hold_out import HoldOut, evaluate_hold_out, hold_out_loss
 from pendmap.diagnosis.refit import add_effects, drop_effect, key_of, refit_with
 from pendmap.diagnosis.scores import Scores, score_candidates
 from pendmap.errors import FitDiverged
+from pendmap.identification.experiment import CLOSED, MISSES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
@@ -222,6 +223,24 @@ class State:
             for fitted in sorted((best, *alike), key=order)
             if fitted is best or self._loses_at_most(most, best, fitted)
         )
+
+    def physical_core(self, core: FittedModel | None) -> FittedModel | None:
+        """Return the part of the physical core that closes half of the gap; None without one.
+
+        Coloured residuals have few independent readings, too few for a significant gain; instead no
+        held-out set may be predicted worse. The smallest such part is returned, unless a larger one
+        closes half of what that leaves.
+        """
+        full = None if core is None else self.remember(self._fit_again(core))
+        if full is None or self.begun.fit.rms < MISSES * self.noise:
+            return None
+        parts = [*(self.leave_out(full, candidate) for candidate in full.chosen), full]
+        best = self.begun
+        for part in sorted(parts, key=lambda t: len(t.chosen)):
+            closed = share_closed(best.fit.rms, part.fit.rms, self.noise)
+            if part.chosen and closed >= 1 - CLOSED and self.keeps_hold_out(best, part):
+                best = part
+        return best if best.chosen else None
 
     def hold_out(self, fitted: FittedModel) -> HoldOut | None:
         """Return the hold-out evaluation of a model; None if it diverges."""
