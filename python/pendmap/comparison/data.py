@@ -209,8 +209,9 @@ def average_blocks(run: FitRun) -> FitRun:
     With weights ``w``, one over the squared errors, ``sum(w x)/sum(w)`` at the mean time has the
     error ``sum(w)^(-1/2)``. The bias ``var(t) a/2``, with the acceleration ``a`` of the parabola
     through five blocks, is subtracted; the remaining error, of order ``T^4/60`` times the fourth
-    derivative in a block of length ``T``, is ``4e-6`` of a swing, or a tenth of the mean's noise. Rounding to counts of ``q`` has
-    the error ``q / sqrt(12)``, that of the mean of a ramp over ``m`` counts ``q / (m sqrt(120))``.
+    derivative in a block of length ``T``, is ``4e-6`` of a swing, or a tenth of the mean's noise.
+    Rounding to counts of ``q`` has the error ``q / sqrt(12)``, that of the mean of a ramp over
+    ``m`` counts ``q / (m sqrt(120))``.
     """
     weights = np.where(run.counted, run.sigmas**-2.0, 0.0)
     for size in range(run.time.size // FEWEST_BLOCKS, LEAST_OF_BLOCK - 1, -1):
@@ -262,7 +263,7 @@ def _dense(time: Floats, theta: Floats, weight: Floats) -> bool:
     swing = min(math.sqrt(2) * float(np.std(theta)), 1.0)
     noise = float(np.median(weight[weight > 0])) ** -0.5
     most, safe = (math.tau / blocks for blocks in BLOCKS)
-    exact = (60 * SHARE * noise / swing) ** 0.25
+    exact = math.sqrt(math.sqrt(60 * SHARE * noise / swing))
     return float(np.median(steps)) * rate < min(max(safe, exact), most)
 
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendmap.comparison.forecast import noise_rms, share_closed
 from pendmap.diagnosis.candidates import CORE, ZERO, Candidate
 from pendmap.diagnosis.fitted_model import (
     FittedModel,
@@ -18,18 +20,34 @@ from pendmap.diagnosis.fitted_model import (
     none_if_diverged,
 )
 from pendmap.diagnosis.refit import best_of, drop_effect
+from pendmap.diagnosis.thresholds import Thresholds
 from pendmap.errors import InputError
+from pendmap.identification.parameters import OPPOSING
+from pendmap.identification.report import DRAG
 from pendmap.identification.turning import rough_start
 from pendmap.model import Rig
+from pendmap.model.effects import library
 from pendmap.model.rig import own_name
+from pendmap.records.experiment import finding_of
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
+    from collections.abc import Collection, Sequence
 
     from pendmap.comparison.data import DataSplit
 
-POOR: Final = 0.1
-"""Residual, over the standard deviation of the angle, above which a fit does not follow it."""
+LOST: Final = 0.1  # Residual of a run, over its swing, above which a fit does not follow it
+POOR: Final = 20.0  # Residual over the noise above which each effect of damping is fitted
+WINDOWS: Final = 4  # Windows in which a run is fitted that is lost as one motion
+OPPOSING_EFFECTS: Final = (
+    DRAG,
+    "cubic_damping",
+    "power_law_drag",
+    "eddy_brake",
+    "load_dependent_friction",
+    "stribeck_friction",
+)
+"""Effects of damping that oppose the motion at any place and time."""
+BEGIN: Final = 0.01  # Nondimensional size at which a fit of an effect of damping begins
 
 
 def fit_baseline(
@@ -71,13 +89,102 @@ def fit_baseline(
     reduced: FittedModel | None = core
     for candidate in added:
         reduced = reduced and drop_effect(data, reduced, candidate, core.level)
-    return best_of(base, reduced) or base, impose_physics(data, core)
+    base = best_of(base, reduced) or base
+    return base, _best_damping(data, base, impose_physics(data, core), without)
+
+
+def fit_followed(
+    data: DataSplit, model: Rig | None = None, without: Collection[str] = ()
+) -> tuple[DataSplit, FittedModel, FittedModel | None]:
+    """Return records that a model follows, and the fits of :func:`fit_baseline` to them.
+
+    A free run that is lost is fitted in windows; one that is lost also there is set aside, with a
+    finding. If no run is followed, all remain.
+    """
+    base, core = fit_baseline(data, model, without)
+    for change in (_in_windows, _set_aside):
+        lost = lost_runs(data, best_of(base, core) or base)
+        if lost and (changed := change(data, lost)) is not None:
+            data = changed
+            base, core = fit_baseline(data, model, without)
+    return data, base, core
+
+
+def _in_windows(data: DataSplit, lost: Sequence[int]) -> DataSplit | None:
+    """Return records with shorter windows in the free runs among those lost."""
+    fitted = list(data.fitted)
+    for k in lost:
+        if not fitted[k].forced:
+            span = float(np.ptp(fitted[k].time))
+            fitted[k] = dataclasses.replace(fitted[k], longest_s=span / WINDOWS)
+    return dataclasses.replace(data, fitted=tuple(fitted))
+
+
+def _set_aside(data: DataSplit, lost: Sequence[int]) -> DataSplit | None:
+    """Return records without the lost runs, with a finding about each; None if none remains."""
+    places = [k for k in range(len(data.fitted)) if k not in lost]
+    out = {data.fitted_of[k] for k in lost}
+    held = [k for k, of in enumerate(data.held_of) if of not in out]
+    if not places or not held:
+        return None
+    runs = list(data.runs)
+    for k in out:
+        finding = finding_of("run-lost", where=runs[k].name, percent=100 * LOST)
+        runs[k] = dataclasses.replace(runs[k], findings=(*runs[k].findings, finding))
+    return dataclasses.replace(
+        data,
+        runs=tuple(runs),
+        fitted=tuple(data.fitted[k] for k in places),
+        fitted_of=tuple(data.fitted_of[k] for k in places),
+        held=tuple(data.held[k] for k in held),
+        held_of=tuple(data.held_of[k] for k in held),
+    )
+
+
+def _best_damping(
+    data: DataSplit, base: FittedModel, core: FittedModel | None, without: Collection[str]
+) -> FittedModel | None:
+    """Return the core, or the baseline with another effect of damping that fits clearly better.
+
+    If the core's residual is far above the noise, scores are no guide: each effect that opposes the
+    motion in proportion to its size is fitted from short windows. One is better if it closes its
+    share of the gap that the core leaves.
+    """
+    before, noise = best_of(base, core) or base, noise_rms(data.fitted)
+    if before.fit.rms < POOR * noise:
+        return core
+    names = [n for n in OPPOSING_EFFECTS if n not in {*base.taken, *without, *CORE}]
+    other = best_of(*(_fit_outright(data, base, name) for name in names))
+    share = 0.0 if other is None else share_closed(before.fit.rms, other.fit.rms, noise)
+    return other if share >= Thresholds().closes else core
+
+
+def _fit_outright(data: DataSplit, base: FittedModel, name: str) -> FittedModel | None:
+    """Return the baseline with an effect, fitted from the records alone; None if it diverges."""
+    effect = Candidate(name, {e.name: e.middle for e in library()[name].parameters if e.is_shape})
+    rough = _start(data)
+    size = effect.effect(rough.units, BEGIN).parameters[effect.size]
+    start: dict[str, float] = {effect.free[0]: size}
+    start |= {name: getattr(rough, name) for name in ("w0", *OPPOSING) if name in base.free}
+    fit = fit_with_candidates(data, base, [effect], start, level=base.level, short=True)
+    fit = fit and converge(data, fit, fit.level)
+    return fit and impose_physics(data, fit)
+
+
+def lost_runs(data: DataSplit, fitted: FittedModel) -> list[int]:
+    """Return the places of the runs that a model does not follow."""
+    lost = []
+    for k, (run, residual) in enumerate(zip(data.fitted, fitted.fit.residuals, strict=True)):
+        good = np.isfinite(residual) & run.counted
+        swing = min(float(np.ptp(run.theta[run.counted])) / 2, math.pi)
+        if not good.any() or float(np.mean(residual[good] ** 2)) > (LOST * swing) ** 2:
+            lost.append(k)
+    return lost
 
 
 def follows(data: DataSplit, fitted: FittedModel) -> bool:
-    """Return whether a model follows the motion: whether its residual is small over the angle."""
-    scatter = np.mean([float(np.std(run.theta)) for run in data.fitted])
-    return fitted.fit.rms <= POOR * float(scatter)
+    """Return whether a model follows all runs."""
+    return not lost_runs(data, fitted)
 
 
 @none_if_diverged

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from pendmap.analysis.run import in_rounds
 from pendmap.comparison.data import split_records
 from pendmap.comparison.forecast import Reasons, compute_gap, compute_part
-from pendmap.diagnosis.baseline import fit_baseline
+from pendmap.diagnosis.baseline import fit_followed
 from pendmap.diagnosis.candidates import checked_own
 from pendmap.diagnosis.fitted_model import settles
 from pendmap.diagnosis.named import name_effects
@@ -106,9 +106,7 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
     moved = in_rounds(progress, _FITS) or (lambda _done, _total: None)
     data = split_records(experiment)
     with _refuse_divergence(experiment):
-        base, core = fit_baseline(data, model, without)
-    # Windows are as long as those over which the baseline followed the runs.
-    data = dataclasses.replace(data, fitted=base.runs)
+        data, base, core = fit_followed(data, model, without)
     moved(1, 1)
     state = State(data, base, thresholds or Thresholds(), max_effects, without, formulas=formulas)
     state.moved = lambda: moved(1, 1)

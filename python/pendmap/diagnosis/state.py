@@ -19,7 +19,7 @@ from pendmap.diagnosis.fitted_model import (
 )
 from pendmap.diagnosis.hold_out import HoldOut, evaluate_hold_out, hold_out_losses
 from pendmap.diagnosis.refit import add_effects, drop_effect, key_of, refit_with
-from pendmap.diagnosis.scores import Scores, score_candidates
+from pendmap.diagnosis.scores import Score, Scores, score_candidates
 from pendmap.errors import FitDiverged
 from pendmap.identification.experiment import CLOSED, MISSES
 
@@ -64,6 +64,13 @@ class Attempt:
     )  # Least fall on a held-out set, in independent readings; None if unused
     accepted: bool  # Whether the search continued with them
     stage: int  # Number of effects before they were added
+
+
+def _opposing(score: Score) -> Score:
+    """Return a score, without gain if an effect that opposes the motion is expected below 0."""
+    size = next(iter(score.start.values()), 0.0)
+    drives = score.candidate.definition.opposing is not None and size < 0
+    return dataclasses.replace(score, gain=0.0) if drives else score
 
 
 class State:
@@ -166,7 +173,10 @@ class State:
         """Return the scores of all candidates at a fit."""
         if fitted not in self._scores:
             self.moved()
-            self._scores[fitted] = score_candidates(self.data, fitted, self._candidates(fitted))
+            scores = score_candidates(self.data, fitted, self._candidates(fitted))
+            self._scores[fitted] = dataclasses.replace(
+                scores, scores=tuple(map(_opposing, scores.scores))
+            )
         return self._scores[fitted]
 
     def _candidates(self, fitted: FittedModel) -> list[list[Candidate]]:
@@ -320,8 +330,9 @@ class State:
 
     def closed(self, reduced: FittedModel, full: FittedModel) -> float:
         """Return the share of the squared gap above the noise that further effects close."""
-        before = reduced if reduced.chosen else self.begun
-        return share_closed(before.fit.rms, full.fit.rms, self.noise)
+        # A model with more effects than the baseline that fits worse has lost the motion.
+        before = min(reduced.fit.rms, self.begun.fit.rms) if reduced.chosen else self.begun.fit.rms
+        return share_closed(before, full.fit.rms, self.noise)
 
     def keeps_hold_out(self, reduced: FittedModel, full: FittedModel) -> bool:
         """Return whether further effects worsen no held-out set.

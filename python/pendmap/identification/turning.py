@@ -248,8 +248,8 @@ SLOW: Final = np.arange(4)  # Powers of the angle in the slow loss of energy ove
 def rotating_start(time: Floats, theta: Floats) -> dict[str, float] | None:
     """Return starting values from the longest rotation in one sense; None without its ripple.
 
-    ``v^2 = 2 w0^2 cos th + P(th)``, with a cubic ``P`` by the initial energy and its loss, is fitted
-    to mean speeds over parts of a turn.
+    ``v^2 = 2 w0^2 cos th + P(th)``, with a cubic ``P`` by the initial energy and its loss, is
+    fitted to mean speeds over parts of a turn.
     """
     steps = np.abs(np.diff(theta))
     every = max(int(math.tau / TURN_PARTS / max(float(np.median(steps)), 1e-9)), 1)
