@@ -29,14 +29,12 @@ KNOWN: Final = 0.1
 """Relative standard error of the noise above which a record is too short to estimate it."""
 FINEST: Final = 1e-7
 """Lower bound on the noise, rad, below that of any sensor; covers errors of local polynomials."""
-BLOCKS: Final = (24, 50)
-"""Fewest blocks in a swing or turn, so that noise and motion are separate in the spectrum; and
-those whose means are exact enough for any noise."""
-SHARE: Final = 0.1  # Error of a block's mean over its noise, up to which fewer blocks are taken
+BLOCKS: Final = 50
+"""Fewest blocks in a swing or turn, so that noise and motion are separate in the spectrum."""
 MOST: Final = 30_000  # Most readings that are fitted; of more, every second or further one is
 FEWEST_BLOCKS: Final = 1000
 """Fewest blocks of a record; with fewer readings the integrator's own steps dominate the cost."""
-LEAST_OF_BLOCK: Final = 2  # Fewest readings of a block
+LEAST_OF_BLOCK: Final = 3  # Fewest readings of a block
 OF_ACCELERATION: Final = "computed from an acceleration, whose own errors are not among the effects"
 NEIGHBOURS: Final = 2  # Blocks on either side to which a parabola is fitted
 
@@ -209,9 +207,8 @@ def average_blocks(run: FitRun) -> FitRun:
     With weights ``w``, one over the squared errors, ``sum(w x)/sum(w)`` at the mean time has the
     error ``sum(w)^(-1/2)``. The bias ``var(t) a/2``, with the acceleration ``a`` of the parabola
     through five blocks, is subtracted; the remaining error, of order ``T^4/60`` times the fourth
-    derivative in a block of length ``T``, is ``4e-6`` of a swing, or a tenth of the mean's noise.
-    Rounding to counts of ``q`` has the error ``q / sqrt(12)``, that of the mean of a ramp over
-    ``m`` counts ``q / (m sqrt(120))``.
+    derivative in a block of length ``T``, is ``1e-6`` of a swing. Rounding to counts of ``q`` has
+    the error ``q / sqrt(12)``, that of the mean of a ramp over ``m`` counts ``q / (m sqrt(120))``.
     """
     weights = np.where(run.counted, run.sigmas**-2.0, 0.0)
     for size in range(run.time.size // FEWEST_BLOCKS, LEAST_OF_BLOCK - 1, -1):
@@ -260,11 +257,7 @@ def _dense(time: Floats, theta: Floats, weight: Floats) -> bool:
     velocity = np.diff(theta) / steps
     # Angular frequency of swings, or of rotations.
     rate = max(float(np.std(velocity) / np.std(theta)), float(np.quantile(np.abs(velocity), 0.99)))
-    swing = min(math.sqrt(2) * float(np.std(theta)), 1.0)
-    noise = float(np.median(weight[weight > 0])) ** -0.5
-    most, safe = (math.tau / blocks for blocks in BLOCKS)
-    exact = math.sqrt(math.sqrt(60 * SHARE * noise / swing))
-    return float(np.median(steps)) * rate < min(max(safe, exact), most)
+    return float(np.median(steps)) * rate < math.tau / BLOCKS
 
 
 def _curvature(time: Floats, theta: Floats) -> Floats:

@@ -169,10 +169,10 @@ def _errors(model: Fits, launches: list[_Launch], swing: float, count: int) -> F
     )
     motion = Motion.of(model.fitted)
     sensors = model.held.sensors_of([one.place for one in launches])
-    states = fit_states(motion, before, [_guess(run, swing) for run in before], sensors)
+    motion = dataclasses.replace(motion, own={**motion.own, **sensors})
+    states = fit_states(motion, before, [_guess(run, swing) for run in before])
     squares, samples = np.zeros(count), np.zeros(count)
-    forecasts = run_forward(motion, whole, states, sensors)
-    for one, (readings, _) in zip(launches, forecasts, strict=True):
+    for one, (readings, _) in zip(launches, run_forward(motion, whole, states), strict=True):
         first = readings.size - one.bins.size
         error = np.angle(np.exp(1j * (one.whole.theta - readings)[first:]))  # modulo a turn
         squares += np.bincount(one.bins, error**2, count)

@@ -23,7 +23,6 @@ from pendmap.diagnosis.refit import best_of, drop_effect
 from pendmap.diagnosis.thresholds import Thresholds
 from pendmap.errors import InputError
 from pendmap.identification.parameters import OPPOSING
-from pendmap.identification.report import DRAG
 from pendmap.identification.turning import rough_start
 from pendmap.model import Rig
 from pendmap.model.effects import library
@@ -38,15 +37,8 @@ if TYPE_CHECKING:
 LOST: Final = 0.1  # Residual of a run, over its swing, above which a fit does not follow it
 POOR: Final = 20.0  # Residual over the noise above which each effect of damping is fitted
 WINDOWS: Final = 4  # Windows in which a run is fitted that is lost as one motion
-OPPOSING_EFFECTS: Final = (
-    DRAG,
-    "cubic_damping",
-    "power_law_drag",
-    "eddy_brake",
-    "load_dependent_friction",
-    "stribeck_friction",
-)
-"""Effects of damping that oppose the motion at any place and time."""
+DAMPING: Final = ("cubic_damping", "power_law_drag", "eddy_brake", "load_dependent_friction")
+"""Effects that oppose the motion at any place and time, besides that of the core."""
 BEGIN: Final = 0.01  # Nondimensional size at which a fit of an effect of damping begins
 
 
@@ -69,8 +61,8 @@ def fit_baseline(
         base = fit_model(data, rig, [*free, *sizes])
     else:
         free = ["w0", "c_over_m", "Tr"]
-        first = _start(data)
-        base = _through_all(data, first, free) or fit_model(data, first, free)
+        rig = _start(data)
+        base = _through_all(data, rig, free) or fit_model(data, rig, free)
     rates = all(run.rod_sensor is not None for run in data.fitted)
     known = {*base.taken, *without, *([ZERO] if rates else [])}  # a rate has no zero of the angle
     added = [candidate for candidate in map(Candidate, CORE) if candidate.name not in known]
@@ -90,7 +82,15 @@ def fit_baseline(
     for candidate in added:
         reduced = reduced and drop_effect(data, reduced, candidate, core.level)
     base = best_of(base, reduced) or base
-    return base, _best_damping(data, base, impose_physics(data, core), without)
+    core = impose_physics(data, core)
+    before, noise = best_of(base, core) or base, noise_rms(data.fitted)
+    if before.fit.rms < POOR * noise:
+        return base, core
+    # Far above the noise scores are no guide: all effects of damping are fitted.
+    names = [name for name in DAMPING if name not in {*base.taken, *without}]
+    other = best_of(*(_fit_outright(data, base, name, rig) for name in names))
+    share = 0.0 if other is None else share_closed(before.fit.rms, other.fit.rms, noise)
+    return base, other if share >= Thresholds().closes else core
 
 
 def fit_followed(
@@ -98,8 +98,7 @@ def fit_followed(
 ) -> tuple[DataSplit, FittedModel, FittedModel | None]:
     """Return records that a model follows, and the fits of :func:`fit_baseline` to them.
 
-    A free run that is lost is fitted in windows; one that is lost also there is set aside, with a
-    finding. If no run is followed, all remain.
+    A run that is lost is fitted in windows, and set aside if it is lost there too.
     """
     base, core = fit_baseline(data, model, without)
     for change in (_in_windows, _set_aside):
@@ -110,13 +109,12 @@ def fit_followed(
     return data, base, core
 
 
-def _in_windows(data: DataSplit, lost: Sequence[int]) -> DataSplit | None:
-    """Return records with shorter windows in the free runs among those lost."""
+def _in_windows(data: DataSplit, lost: Sequence[int]) -> DataSplit:
+    """Return records with shorter windows in the lost free runs."""
     fitted = list(data.fitted)
-    for k in lost:
-        if not fitted[k].forced:
-            span = float(np.ptp(fitted[k].time))
-            fitted[k] = dataclasses.replace(fitted[k], longest_s=span / WINDOWS)
+    for k in (k for k in lost if not fitted[k].forced):
+        longest = float(np.ptp(fitted[k].time)) / WINDOWS
+        fitted[k] = dataclasses.replace(fitted[k], longest_s=longest)
     return dataclasses.replace(data, fitted=tuple(fitted))
 
 
@@ -141,32 +139,16 @@ def _set_aside(data: DataSplit, lost: Sequence[int]) -> DataSplit | None:
     )
 
 
-def _best_damping(
-    data: DataSplit, base: FittedModel, core: FittedModel | None, without: Collection[str]
-) -> FittedModel | None:
-    """Return the core, or the baseline with another effect of damping that fits clearly better.
-
-    If the core's residual is far above the noise, scores are no guide: each effect that opposes the
-    motion in proportion to its size is fitted from short windows. One is better if it closes its
-    share of the gap that the core leaves.
-    """
-    before, noise = best_of(base, core) or base, noise_rms(data.fitted)
-    if before.fit.rms < POOR * noise:
-        return core
-    names = [n for n in OPPOSING_EFFECTS if n not in {*base.taken, *without, *CORE}]
-    other = best_of(*(_fit_outright(data, base, name) for name in names))
-    share = 0.0 if other is None else share_closed(before.fit.rms, other.fit.rms, noise)
-    return other if share >= Thresholds().closes else core
-
-
-def _fit_outright(data: DataSplit, base: FittedModel, name: str) -> FittedModel | None:
-    """Return the baseline with an effect, fitted from the records alone; None if it diverges."""
+def _fit_outright(data: DataSplit, base: FittedModel, name: str, begin: Rig) -> FittedModel | None:
+    """Return the baseline with an effect, fitted from short windows; None if it diverges."""
     effect = Candidate(name, {e.name: e.middle for e in library()[name].parameters if e.is_shape})
-    rough = _start(data)
-    size = effect.effect(rough.units, BEGIN).parameters[effect.size]
-    start: dict[str, float] = {effect.free[0]: size}
-    start |= {name: getattr(rough, name) for name in ("w0", *OPPOSING) if name in base.free}
-    fit = fit_with_candidates(data, base, [effect], start, level=base.level, short=True)
+    size = {effect.free[0]: effect.effect(begin.units, BEGIN).parameters[effect.size]}
+    rough: dict[str, float] = {n: getattr(begin, n) for n in ("w0", *OPPOSING) if n in base.free}
+    fits = (
+        fit_with_candidates(data, base, [effect], size | known, level=base.level, short=True)
+        for known in ({}, rough)
+    )
+    fit = best_of(*fits)
     fit = fit and converge(data, fit, fit.level)
     return fit and impose_physics(data, fit)
 

@@ -50,7 +50,7 @@ def evaluate_hold_out(data: DataSplit, fitted: FittedModel) -> HoldOut:
     search: dict[str, Any] = {"steps": FEW_STEPS, "least_gain": LITTLE}
     if data.inside:
         free = tuple(name for name in free if name in known)
-        places = {of: k for k, of in enumerate(data.held_of)}
+        places = {data.fitted_of.index(of): k for k, of in enumerate(data.held_of)}
         windows = tuple((places[w[0]], *w[1:]) for w in fitted.fit.windows if w[0] in places)
         known |= fitted.fit.sensors_of([data.fitted_of.index(of) for of in data.held_of])
         search = {"steps": 0, "windows": windows}

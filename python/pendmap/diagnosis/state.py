@@ -235,11 +235,10 @@ class State:
         )
 
     def physical_core(self, core: FittedModel | None) -> FittedModel | None:
-        """Return the part of the physical core that closes half of the gap; None without one.
+        """Return the smallest part of the core that closes half of the gap; None without one.
 
-        Coloured residuals have few independent readings, too few for a significant gain; instead no
-        held-out set may be predicted worse. The smallest such part is returned, unless a larger one
-        closes half of what that leaves.
+        Coloured residuals have too few independent readings for a significant gain; instead no
+        held-out set may be predicted worse.
         """
         full = None if core is None else self.remember(self._fit_again(core))
         if full is None or self.begun.fit.rms < MISSES * self.noise:

@@ -31,7 +31,7 @@ class Motion:
     """Equation of motion of a fitted pendulum."""
 
     model: Rig  # Model with its effects
-    own: Mapping[str, float]  # Values that replace the model's parameters
+    own: Mapping[str, float]  # Values of the model's parameters, and of sensors by their run
 
     @classmethod
     def of(cls, fit: TrajectoryFit) -> Motion:
@@ -40,10 +40,7 @@ class Motion:
 
 
 def run_forward(
-    motion: Motion,
-    runs: Sequence[FitRun],
-    states: States,
-    sensors: Mapping[str, float] | None = None,
+    motion: Motion, runs: Sequence[FitRun], states: States
 ) -> list[tuple[Floats, Floats]]:
     """Return readings (n,), rad, and angle and velocity (2, n), rad and rad/s, of each run.
 
@@ -51,29 +48,19 @@ def run_forward(
     (rad/s) at the first time of each. Raises FitDiverged.
     """
     blank = [dataclasses.replace(run, theta=np.zeros(run.time.shape), trusted=None) for run in runs]
-    fit = _fit_motion(motion, blank, states, sensors or {}, steps=0)
+    fit = _fit_motion(motion, blank, states, steps=0)
     pairs = zip(fit.residuals, fit.curves, strict=True)
     return [(-residual, curve) for residual, curve in pairs]
 
 
-def fit_states(
-    motion: Motion, runs: Sequence[FitRun], states: States, sensors: Mapping[str, float]
-) -> list[tuple[float, float]]:
-    """Return the least-squares initial states of runs; raises FitDiverged.
-
-    ``sensors`` are bias and tilt of their sensors.
-    """
-    fit = _fit_motion(motion, runs, states, sensors, steps=STATE_STEPS)
+def fit_states(motion: Motion, runs: Sequence[FitRun], states: States) -> list[tuple[float, float]]:
+    """Return the least-squares initial states of runs; raises FitDiverged."""
+    fit = _fit_motion(motion, runs, states, steps=STATE_STEPS)
     return [(theta, velocity) for *_, theta, velocity in fit.windows]
 
 
 def _fit_motion(
-    motion: Motion,
-    runs: Sequence[FitRun],
-    states: States,
-    sensors: Mapping[str, float],
-    *,
-    steps: int,
+    motion: Motion, runs: Sequence[FitRun], states: States, *, steps: int
 ) -> TrajectoryFit:
     """Fit initial states, in one window a run, with all parameters fixed."""
     whole = [dataclasses.replace(run, longest_s=math.inf) for run in runs]
@@ -85,8 +72,8 @@ def _fit_motion(
     return fit_runs(
         whole,
         motion.model,
-        tuple(values),
-        start={**values, **sensors},
+        tuple(name for name in values if name in OWN),
+        start=values,
         windows=windows,
         profiled=(),
         hold=True,

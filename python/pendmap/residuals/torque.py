@@ -198,7 +198,10 @@ def responses(run: FitRun, window: WindowSlopes, torques: Floats) -> Floats:
         return np.zeros(torques.shape)
     weight = window.weight
     read = (window.states / np.where(weight > 0, weight, 1.0)[:, None]).T
-    a, b = read if run.rod_sensor is None else _angles_of_rates(time, read / run.rod_sensor.rate)
+    a, b = read
+    if run.rod_sensor is not None:
+        rises = 0.5 * (read[:, 1:] + read[:, :-1]) * np.diff(time) / run.rod_sensor.rate
+        a, b = np.cumsum(np.column_stack([[1.0, 0.0], rises]), axis=1)
     wronskian = a * np.gradient(b, time) - np.gradient(a, time) * b
     sound = np.abs(wronskian) > LOST * float(np.max(np.abs(wronskian)))
     inverse = np.where(sound, 1.0 / np.where(sound, wronskian, 1.0), 0.0)
@@ -211,12 +214,6 @@ def responses(run: FitRun, window: WindowSlopes, torques: Floats) -> Floats:
 
     response = read[1][:, None] * integral(a) - read[0][:, None] * integral(b)
     return np.asarray(response * weight[:, None], np.float64)
-
-
-def _angles_of_rates(time: Floats, rates: Floats) -> Floats:
-    """Return derivatives of the angle by the initial state from those of the velocity, (2, n)."""
-    mean = 0.5 * (rates[:, 1:] + rates[:, :-1])
-    return np.cumsum(np.column_stack([[1.0, 0.0], mean * np.diff(time)]), axis=1)
 
 
 def _solved(columns: Floats, residual: Floats) -> tuple[Floats, Floats, tuple[float, int]]:
