@@ -101,7 +101,7 @@ def fit_followed(
     A run that is lost is fitted in windows, and set aside if it is lost there too.
     """
     base, core = fit_baseline(data, model, without)
-    for change in (_in_windows, _set_aside):
+    for change in (in_windows, set_aside):
         lost = lost_runs(data, best_of(base, core) or base)
         if lost and (changed := change(data, lost)) is not None:
             data = changed
@@ -109,7 +109,7 @@ def fit_followed(
     return data, base, core
 
 
-def _in_windows(data: DataSplit, lost: Sequence[int]) -> DataSplit:
+def in_windows(data: DataSplit, lost: Sequence[int]) -> DataSplit:
     """Return records with shorter windows in the lost free runs."""
     fitted = list(data.fitted)
     for k in (k for k in lost if not fitted[k].forced):
@@ -118,7 +118,7 @@ def _in_windows(data: DataSplit, lost: Sequence[int]) -> DataSplit:
     return dataclasses.replace(data, fitted=tuple(fitted))
 
 
-def _set_aside(data: DataSplit, lost: Sequence[int]) -> DataSplit | None:
+def set_aside(data: DataSplit, lost: Sequence[int]) -> DataSplit | None:
     """Return records without the lost runs, with a finding about each; None if none remains."""
     places = [k for k in range(len(data.fitted)) if k not in lost]
     out = {data.fitted_of[k] for k in lost}

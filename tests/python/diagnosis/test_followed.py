@@ -13,7 +13,9 @@ from scipy.signal import lfilter
 import pendmap
 from driven_decays import motion
 from pendmap.comparison.data import split_records
-from pendmap.diagnosis.baseline import fit_baseline, fit_followed, lost_runs
+from pendmap.diagnosis import baseline
+from pendmap.diagnosis.baseline import fit_baseline, lost_runs
+from pendmap.diagnosis.fitted_model import fit_model
 from pendmap.diagnosis.state import State
 from pendmap.diagnosis.thresholds import Thresholds
 from pendmap.records import Experiment, Run
@@ -77,16 +79,21 @@ def test_a_rotation_gives_the_natural_frequency(start: float, speed: float, w0: 
     assert pendmap.diagnose(run, max_effects=0).verdict == "none"
 
 
-def test_a_run_of_another_pendulum_is_set_aside() -> None:
-    runs = [run_of(decay(a), str(k), seed=k) for k, a in enumerate((1.5, 0.9))]
-    other = run_of(decay(1.4, w0=4.4), "other")
-    data, base, core = fit_followed(split_records(experiment(*runs, other)))
-    assert [data.runs[k].name for k in data.fitted_of] == ["0", "1"]
-    assert {data.runs[k].name for k in data.held_of} == {"0", "1"}
-    (finding,) = data.runs[2].findings
-    assert finding.text == "no model follows it to 10 % of its swing: it is set aside"
-    assert not lost_runs(data, base)
-    assert core is not None
+def test_a_lost_run_is_fitted_in_windows_or_set_aside() -> None:
+    starts = {"0": 1.5, "1": 0.9, "other": 1.4}
+    runs = [run_of(decay(a, w0=4.4 if k == "other" else 6.2), k) for k, a in starts.items()]
+    data = split_records(experiment(*runs))
+    windows = [(k, 0, TIME.size, a, 0.0) for k, a in enumerate(starts.values())]
+    fitted = fit_model(data, pendmap.Rig(6.2, 0.05, 0.05), ["w0"], windows=windows, steps=0)
+    assert lost_runs(data, fitted) == [2]
+    shorter = baseline.in_windows(data, [2])
+    assert [run.longest_s for run in shorter.fitted] == [None, None, pytest.approx(TIME[-1] / 4)]
+    left = baseline.set_aside(data, [2])
+    assert left is not None
+    assert [left.runs[k].name for k in left.fitted_of] == ["0", "1"]
+    assert {left.runs[k].name for k in left.held_of} == {"0", "1"}
+    assert left.runs[2].findings[-1].what == "run-lost"
+    assert baseline.set_aside(data, [0, 1, 2]) is None
 
 
 def test_what_opposes_the_motion_is_no_start_below_0() -> None:
