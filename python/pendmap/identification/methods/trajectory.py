@@ -20,7 +20,7 @@ from pendmap.identification.methods.base import Identification
 from pendmap.identification.parameters import OFFSET, OPPOSING, SENSOR, opposing
 from pendmap.identification.readings import as_fit_run, reading_of_run
 from pendmap.identification.sensitivity import upper_limit
-from pendmap.identification.turning import TooShortError, rough_start, swinging
+from pendmap.identification.turning import TooShortError, rotating_start, rough_start, swinging
 from pendmap.model import Rig
 from pendmap.model.effects import Effect
 from pendmap.signal.half_cycles import swings
@@ -164,7 +164,7 @@ def _start_of(start: Rig | Mapping[str, float] | None, run: FitRun, sigma: float
         return start
     time, theta = run.time[run.counted], run.angle[run.counted]
     peaks = np.abs(swings(*swinging(time, theta)).peak)
-    if peaks.size and np.median(peaks) > math.pi:
+    if peaks.size and np.median(peaks) > math.pi and rotating_start(time, theta) is None:
         text, _ = texts()["angle-unit.wrong"]
         raise InputError(f"{run.name}: {text.format(largest=peaks.max())}")
     rough = rough_start(time, theta, sigma) or {}
