@@ -57,8 +57,8 @@ def channels_of(  # noqa: C901 (a step each)
         if column.name is not None or name in table.names:
             places[channel] = _place(name, table, f"{where}: {channel}")
     # An empty column gives way to another.
-    empty = np.isnan(table.values).all(axis=0)
-    filled = ["" if bare else name for name, bare in zip(table.names, empty, strict=True)]
+    columns = zip(table.names, table.values.T, strict=True)
+    filled = [name if np.isfinite(values).any() else "" for name, values in columns]
     for channel, kind in CHANNELS.items():
         if channel in places or kind.default not in filled:
             continue
