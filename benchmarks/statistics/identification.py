@@ -69,9 +69,11 @@ def recipe_errors() -> dict[str, float]:
     exact, wanted = truths["free_decay"]["nonlinear"][0], truths["decrement_recipe"][0]
     peaks = Peaks.of(np.array(exact["times"], float)[:-1], np.array(exact["thetas"], float)[:-1])
     small, _ = combined.small_peaks(peaks)
-    made = combined.from_amplitudes(np.abs(small.amplitude), small.time, "all", 0)
-    names = ("delta", "zeta", "theta_r", "mean_period", "w0", "Tr")
-    return {name: abs(getattr(made, name) - wanted[name]) for name in names}
+    size = np.abs(small.amplitude)
+    w0, _, friction = combined.from_amplitudes(np.concatenate((size, small.time)))
+    made = {"delta": combined.decrement(size), "theta_r": combined.coulomb(size)}
+    made |= {"w0": w0, "Tr": friction}
+    return {name: abs(value - wanted[name]) for name, value in made.items()}
 
 
 def motion() -> Motion:
@@ -113,10 +115,7 @@ def choices(peaks: Peaks) -> dict[str, Identification]:
     for floor in (0.0, 3.0):
         some = peaks.turned
         some = some.select(np.abs(some.amplitude) >= math.radians(floor))
-        for reading in ("all", "odd_ends", "odd_triplets"):
-            made[f"combined, {reading}, {floor:g} to 12 deg"] = combined.from_peaks(
-                some, reading=reading
-            )
+        made[f"combined, {floor:g} to 12 deg"] = combined.from_peaks(some)
         for cut in (12.0, 30.0, 90.0, 180.0):
             name = f"log_decrement, {floor:g} to {cut:g} deg"
             made[name] = lines.log_decrement(some, cut=math.radians(cut))
@@ -271,7 +270,7 @@ def spoilers(path: Motion, count: int) -> None:
     ):
         sensor = SENSOR if noise else dataclasses.replace(SENSOR, noise=0.0, counts=0)
         cells = []
-        for name in ("combined", "combined_odd_ends", "combined_odd_triplets", "combined_repaired"):
+        for name in ("combined", "combined_repaired"):
             made = []
             for seed in range(count if noise else 1):
                 times, angles = record(path, seed, offset, sensor)
@@ -281,7 +280,7 @@ def spoilers(path: Motion, count: int) -> None:
                     made.append(misses(found, truth, start)[0])
             cells.append(f"{np.median(made):.2e}" if made else "-")
         rows.append((label, *cells))
-    headers = ("spoiled by", "as printed", "odd ends", "odd triplets", "repaired")
+    headers = ("spoiled by", "as printed", "repaired")
     say("Error of the simulated peaks against the truth, rad rms, medians")
     say(table(headers, rows))
 

@@ -21,8 +21,8 @@ from pendmap.comparison.forecast import (
 from pendmap.diagnosis.advice import Advice, advise
 from pendmap.diagnosis.named import NamedEffect, effect_values
 from pendmap.diagnosis.table import HEAD, NOTE, Standings
-from pendmap.formatting import Estimate, estimate_text
-from pendmap.identification.report import SHORT
+from pendmap.formatting import Estimate
+from pendmap.identification.report import in_line
 from pendmap.identification.results import ARRAYS, FitResult, Followed
 from pendmap.model.effects import definition
 from pendmap.model.labels import unit_of
@@ -68,8 +68,6 @@ PLACES: Final[dict[str, str]] = {
 TORQUE: Final = unit_of("torque")  # Unit of a torque per moment of inertia
 
 WHERE: Final = 3  # Number of bins of a residual torque in the summary
-
-"""End of the line of an effect whose name is approximate."""
 
 MOST_EFFECTS: Final = 3  # Default of the largest number of effects that are added
 
@@ -303,12 +301,7 @@ def as_text(result: Discrepancy) -> Iterator[str]:
     yield from doubt_lines(result.data.experiment, *runs)
     gap, assessment = result.gap, result.assessment
     yield f"Verdict: {result.verdict}: {SAID[result.verdict]}"
-    known = result.parameters
-    yield "Model: " + ", ".join(
-        f"{symbol} = {estimate_text(known[name])} {unit}"
-        for name, (symbol, unit) in SHORT.items()
-        if name in known
-    )
+    yield f"Model: {in_line(result.parameters)}"
     for effect in result.effects:
         units = {n: unit_of(f"{effect.name}.{n}", result.definition) for n in effect.parameters}
         ci95 = sure_intervals(effect)

@@ -267,10 +267,7 @@ def as_json(report: IdentificationReport) -> dict[str, Any]:
         "noise": report.peaks.sigma,
         "best": None if best is None else best.method,
         "doubts": foremost(report),
-        "quantities": {
-            name: None if one is None else dataclasses.asdict(one)
-            for name, one in ((name, known.get(name)) for name in QUANTITIES)
-        },
+        "quantities": {n: dataclasses.asdict(known[n]) if n in known else None for n in QUANTITIES},
         "q_amplitude_rad": report.largest_swing / 2 if "Q" in known else None,
         "methods": {name: _method(result) for name, result in report.methods.items()},
         "table1": [
@@ -313,11 +310,10 @@ def run_entries(report: IdentificationReport) -> list[dict[str, Any]]:
 
 def _method(result: Identification) -> dict[str, Any]:
     known = result.parameters
-    names = list(dict.fromkeys([*COLUMNS, *known]))
-    entry: dict[str, Any] = {name: known[name].value if name in known else None for name in names}
-    return entry | {
-        "stderr": {name: known[name].stderr if name in known else None for name in names},
-        "ci95": {name: known[name].ci95 if name in known else None for name in names},
+    every = {name: known.get(name) for name in (*COLUMNS, *known)}
+    return {name: e and e.value for name, e in every.items()} | {
+        "stderr": {name: e and e.stderr for name, e in every.items()},
+        "ci95": {name: e and e.ci95 for name, e in every.items()},
         "warnings": list(result.warnings),
         "used": result.used,
         "applicable": result.applicable,
@@ -348,13 +344,9 @@ def in_short(report: IdentificationReport) -> Iterator[str]:
     best = report.sound
     yield from (f"Warning: {text}" for text in foremost(report))
     if best is not None:
-        names = [*SHORT, *(n for n in best.estimates if n not in (*COLUMNS, *SHORT))]
-        yield ", ".join(
-            f"{symbol} = {estimate_text(best.parameters[name])} {unit}".rstrip()
-            for name in names
-            if name in best.parameters
-            for symbol, unit in [SHORT.get(name, (name, best.unit(name)))]
-        )
+        further = {n: e for n, e in best.estimates.items() if n not in COLUMNS}
+        texts = [f"{n} = {estimate_text(e)} {best.unit(n)}".rstrip() for n, e in further.items()]
+        yield ", ".join([in_line(best.parameters), *texts])
         yield from lines_of(report.quantities, report.largest_swing / 2)
         yield f"{best.method}: {best.used}"
     runs_text = left_out(report.experiment, report.runs)
@@ -370,6 +362,15 @@ def in_short(report: IdentificationReport) -> Iterator[str]:
             f"residual is {report.with_drag.fit.rms:.3g} rad, {report.joint.fit.rms:.3g} without: "
             f"--effect {DRAG} fits it, diagnose looks for more"
         )
+
+
+def in_line(known: Mapping[str, Estimate]) -> str:
+    """Return the parameters that are said first, with symbols and units."""
+    return ", ".join(
+        f"{symbol} = {estimate_text(known[name])} {unit}"
+        for name, (symbol, unit) in SHORT.items()
+        if name in known
+    )
 
 
 def foremost(report: IdentificationReport) -> list[str]:

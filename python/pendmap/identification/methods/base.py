@@ -11,6 +11,7 @@ import numpy as np
 from pendmap.formatting import Estimate, counted, estimate_text
 from pendmap.identification.parameters import OPPOSING, PLACES, widened
 from pendmap.identification.results import Parameters
+from pendmap.identification.uncertainty import computed_from
 from pendmap.model import Rig
 from pendmap.signal.robust import Z95
 
@@ -136,27 +137,13 @@ class Identification(Parameters):
 
         Errors are by the delta method; without a covariance the parameters are independent.
         """
-        made = {}
-        for name, numerator, power in (("zeta", "c_over_m", 1), ("theta_r", "Tr", 2)):
-            if numerator not in self.estimates or "w0" not in self.estimates:
-                continue
-            over, w0 = self.estimates[numerator], self.estimates["w0"]
-            scale = 1 / (2 * w0.value) if power == 1 else 1 / w0.value**2
-            value = over.value * scale
-            if over.stderr is None or w0.stderr is None:
-                ends = over.ci95
-                made[name] = Estimate(
-                    value, None, None if ends is None else (scale * ends[0], scale * ends[1])
-                )
-                continue
-            lever = -power * value / w0.value
-            names, matrix = self.covariance or ((), np.empty((0, 0)))
-            both = {numerator, "w0"} <= set(names)
-            shared = float(matrix[names.index(numerator), names.index("w0")]) if both else 0.0
-            variance = (scale * over.stderr) ** 2 + (lever * w0.stderr) ** 2
-            error = math.sqrt(max(variance + 2 * scale * lever * shared, 0.0))
-            made[name] = Estimate(value, error, (value - Z95 * error, value + Z95 * error))
-        return made
+        given = {n: e for n, e in self.estimates.items() if n in ("w0", *OPPOSING)}
+
+        def quantities(p: dict[str, float]) -> dict[str, float]:
+            made = {"zeta": ("c_over_m", 2 * p["w0"]), "theta_r": ("Tr", p["w0"] ** 2)}
+            return {n: p[over] / under for n, (over, under) in made.items() if over in p}
+
+        return computed_from(given, self.covariance, quantities) if "w0" in given else {}
 
     @property
     def rig(self) -> Rig:

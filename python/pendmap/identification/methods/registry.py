@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -25,8 +24,6 @@ BEST: Final = "trajectory"  # The default method
 
 _OF_PEAKS: Final[Mapping[str, Callable[[Peaks], Identification]]] = {
     "combined": combined.from_peaks,
-    "combined_odd_ends": functools.partial(combined.from_peaks, reading="odd_ends"),
-    "combined_odd_triplets": functools.partial(combined.from_peaks, reading="odd_triplets"),
     "combined_repaired": repaired.from_peaks,
     "log_decrement": lines.log_decrement,
     "de_paula": lines.de_paula,
