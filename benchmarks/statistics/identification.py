@@ -25,7 +25,7 @@ from benchmarks.peers.report import machine, note, say, table
 from pendmap.identification import Estimate, Identification, Peaks, find_peaks, identify
 from pendmap.identification.methods import combined, lines
 from pendmap.identification.period import mean_period
-from pendmap.identification.table1 import State, peak_errors
+from pendmap.identification.table1 import State, errors_of, peak_errors, simulated_peaks
 from pendmap.virtual_rig.effects.base import Drive
 from pendmap.virtual_rig.equation import Equation, Parameters
 from pendmap.virtual_rig.integrator import integrate
@@ -207,7 +207,9 @@ def misses(found: Identification, truth: Peaks, start: State) -> tuple[float, fl
     A peak that a simulation lacks, because it has come to rest, is taken as 0 rad; its period is
     left out.
     """
-    errors = peak_errors(found, truth, start, offset=0.0)
+    begun = dataclasses.replace(start, theta=start.theta - found.zero)
+    times, angles = simulated_peaks(found.rig, begun, 1.2 * float(truth.time[-1]) + 5.0)
+    errors = errors_of(found.method, truth, times, angles)
     peak = np.where(np.isnan(errors.peak_error), -100.0, errors.peak_error) / 100 * errors.peak
     period = errors.period_error / 100 * errors.period
     known = period[np.isfinite(period)]

@@ -66,9 +66,7 @@ PLACES: Final[dict[str, str]] = {
 """Text before the bin of a missing torque, by quantity."""
 
 TORQUE: Final = unit_of("torque")  # Unit of a torque per moment of inertia
-
 WHERE: Final = 3  # Number of bins of a residual torque in the summary
-
 MOST_EFFECTS: Final = 3  # Default of the largest number of effects that are added
 
 

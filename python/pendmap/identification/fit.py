@@ -227,8 +227,7 @@ def _found_model(model: Rig, estimates: Mapping[str, Estimate]) -> Rig:
 MISSED: Final = 0.5
 """Rms residual over the readings' standard deviation above which a fit is refused."""
 
-FAR: Final = 1.0
-"""Rms residual, rad, above which a fit is refused, also for rotations."""
+FAR: Final = 1.0  # Rms residual, rad, above which a fit is refused, also for rotations
 
 
 def refuse_astray(path: Path, runs: Sequence[FitRun], fit: TrajectoryFit) -> None:

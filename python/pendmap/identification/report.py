@@ -232,29 +232,22 @@ class IdentificationReport(FitResult):
 
 def left_out(experiment: Experiment, read: Sequence[Run]) -> str:
     """Return the text on the runs that were used and not used; empty if all were used."""
-    reasons: Counter[tuple[str, str]] = Counter()  # words before and after "run"
-    # If held-out runs are used too, being held out is no reason.
-    held_too = any(used_run.hold_out for used_run in read)
-    for run in experiment.runs:
-        if any(run is used_run for used_run in read):
-            continue
+    held_too = any(run.hold_out for run in read)  # then being held out is no reason
+
+    def reason(run: Run) -> str:
         if run.copied:
-            why = "", " that copies another"
-        elif run.kind == "forced":
-            why = ("", " held out") if run.hold_out and not held_too else ("forced ", "")
-        elif run.peaks_only and (held_too or not run.hold_out):
-            why = "", " of peaks alone"
-        elif not run.moves:
-            why = "", " in which nothing moves"
-        else:
-            why = ("", " held out") if run.hold_out else ("shorter ", "")
-        reasons[why] += 1
-    if not reasons:
-        return ""
-    parts = [counted(n, f"{before}run") + after for (before, after), n in reasons.items()]
-    words = " and ".join(part for part in (", ".join(parts[:-1]), parts[-1]) if part)
-    verb = "is" if sum(reasons.values()) == 1 else "are"
-    return f"{counted(len(read), 'run')} read; {words} {verb} not used"
+            return "copied"
+        if run.hold_out and not held_too:
+            return "held out"
+        if run.kind == "forced":
+            return "forced"
+        if run.peaks_only:
+            return "of peaks alone"
+        return "held out" if run.hold_out else "shorter" if run.moves else "at rest"
+
+    reasons = Counter(reason(run) for run in experiment.runs if all(run is not r for r in read))
+    texts = [f"{count} {why}" for why, count in reasons.items()]
+    return f"{counted(len(read), 'run')} read; not used: {', '.join(texts)}" if texts else ""
 
 
 def as_json(report: IdentificationReport) -> dict[str, Any]:

@@ -94,12 +94,8 @@ def least_squares_line(x: Floats, y: Floats, stderr: Floats) -> tuple[Floats, Fl
 
     The misfit is chi^2 per degree of freedom; the covariance is multiplied by it if it is above 1.
     """
-    rows = np.column_stack((np.ones_like(x), x)) / stderr[:, None]
-    inverse = np.asarray(np.linalg.inv(rows.T @ rows), np.float64)
-    coefficients = inverse @ (rows.T @ (y / stderr))
-    residual = y / stderr - rows @ coefficients
-    misfit = float(residual @ residual) / max(x.size - 2, 1)
-    return coefficients, inverse * max(misfit, 1.0), misfit
+    rows = np.column_stack((np.ones_like(x), x))
+    return chain_least_squares(rows, y, np.stack((stderr**2, np.zeros(x.size))))
 
 
 def chain_covariance(pairs: Indices, left: Floats, right: Floats, variance: Floats) -> Floats:

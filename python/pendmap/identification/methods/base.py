@@ -108,13 +108,12 @@ class Identification(Parameters):
 
     def with_clock(self, stderr: float) -> Identification:
         """Return the result with the relative standard error of a sampling interval added."""
-        estimates, further = {}, {}
+        further = {n: stderr * PLACES[n][1] * self[n] for n in self.estimates if n in PLACES}
+        estimates = {}
         for name, e in self.estimates.items():
-            clock_error = further[name] = (
-                stderr * PLACES[name][1] * e.value if name in PLACES else 0.0
-            )
-            error = None if e.stderr is None else math.hypot(e.stderr, clock_error)
-            ends = None if e.ci95 is None else widened(e.value, e.ci95, clock_error)
+            more = further.setdefault(name, 0.0)
+            error = None if e.stderr is None else math.hypot(e.stderr, more)
+            ends = None if e.ci95 is None else widened(e.value, e.ci95, more)
             estimates[name] = Estimate(e.value, error, ends)
         covariance = self.covariance
         if covariance is not None:
@@ -184,21 +183,22 @@ def identified(  # noqa: PLR0913 (all of a result)
     misfit: float | None = None,
     intervals: Mapping[str, tuple[float, float]] | None = None,
 ) -> Identification:
-    """Return a result with normal 95 % intervals unless they are given.
+    """Return a result with normal 95 % intervals unless they are given; errors of 0 are unknown.
 
     A warning is added for each negative damping parameter.
     """
-    estimates, negative = {}, []
+    estimates, negative, known = {}, [], bool(np.any(covariance))
     for name, value, variance in zip(names, values.tolist(), np.diag(covariance), strict=True):
         error = math.sqrt(max(float(variance), 0.0))
         normal = (value - Z95 * error, value + Z95 * error)
-        estimates[name] = Estimate(value, error, (intervals or {}).get(name, normal))
+        ci95 = (intervals or {}).get(name, normal)
+        estimates[name] = Estimate(value, error, ci95) if known else Estimate(value)
         if name in OPPOSING and value < 0:
             negative.append(f"unphysical: {name} is {value:.4g}, below 0")
     return Identification(
         estimates=estimates,
         used=used,
         warnings=(*warnings, *negative),
-        covariance=(names, np.asarray(covariance)),
+        covariance=(names, np.asarray(covariance)) if known else None,
         misfit=misfit,
     )

@@ -30,8 +30,7 @@ if TYPE_CHECKING:
 _FEWEST: Final = 5  # Fewest peaks
 _LARGEST: Final = 2.0
 """Amplitude below which peaks determine w0, rad: above, damping affects the half period."""
-_PHASE: Final = 0.5
-"""Half-width of the windows in which the velocity is fitted, rad of phase w0 t."""
+_PHASE: Final = 0.5  # Half-width of the windows in which the velocity is fitted, rad of phase w0 t
 _SAMPLES: Final = 25
 """Samples per period below which a warning is given: the quartic smooths the velocity."""
 

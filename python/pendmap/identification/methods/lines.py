@@ -100,17 +100,10 @@ def de_paula(
     """
     turned = peaks.turned
     size = np.abs(turned.amplitude)
-    windows = {"fast": fast, "slow": slow}
-    chosen = {n: turned.select((size >= low) & (size < high)) for n, (low, high) in windows.items()}
-    lacking = [
-        too_few(len(some), _FEWEST, len(turned), _between(windows[name]))
-        for name, some in chosen.items()
-        if len(some) < _FEWEST
-    ]
-    if lacking:
-        texts = tuple(text for result in lacking for text in result.warnings)
-        return Identification(warnings=texts, applicable=False)
-    quick, slack = chosen["fast"], chosen["slow"]
+    quick, slack = (turned.select((size >= low) & (size < high)) for low, high in (fast, slow))
+    for some, window in ((quick, fast), (slack, slow)):
+        if len(some) < _FEWEST:
+            return too_few(len(some), _FEWEST, len(turned), _between(window))
     warnings = []
     speed = frequency(
         turned.select((size < max(fast[1], slow[1])) & (size >= min(fast[0], slow[0])))
