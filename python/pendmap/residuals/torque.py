@@ -106,7 +106,7 @@ def residual_torque(runs: Sequence[FitRun], fit: TrajectoryFit, noise: ResidualN
         rest = _without_own(name, every[:, part], places, drag=drag)
         errors = np.sqrt(np.maximum(np.diag(rest @ covariance[part, part] @ rest), 0.0))
         values = np.stack((lows, highs, rest @ torques[part], errors), axis=1).tolist()
-        about = {"over": name, "unit": OVER[name], "along_motion": name in ALONG}
+        about: dict[str, Any] = {"over": name, "unit": OVER[name], "along_motion": name in ALONG}
         for ends_and_torque in values:
             row = about | dict(zip(ROW, ends_and_torque, strict=True))
             rows[name].append(row | {"z": row["torque"] / row["stderr"] if row["stderr"] else 0.0})
