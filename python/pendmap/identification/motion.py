@@ -68,12 +68,11 @@ def _fit_motion(
         (k, 0, run.time.size, *state)
         for k, (run, state) in enumerate(zip(whole, states, strict=True))
     ]
-    values = motion.own
     return fit_runs(
         whole,
         motion.model,
-        tuple(values),
-        start=values,
+        tuple(motion.own),
+        start=motion.own,
         windows=windows,
         profiled=(),
         hold=True,

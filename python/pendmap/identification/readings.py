@@ -28,7 +28,6 @@ LEAST: Final = 1e-15  # Least noise of a reading, rad
 DITHERED: Final = 0.45
 """Noise (with rounding) over the count below which errors are correlated: intervals are fitted."""
 
-
 FEWEST_A_PERIOD: Final = 20.0
 """Fewest samples per period of small swings for polynomials: a quartic has nine in a window."""
 

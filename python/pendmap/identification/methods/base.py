@@ -152,9 +152,7 @@ class Identification(Parameters):
         known: dict[str, Any] = {
             n: e.value for n, e in self.estimates.items() if n in Rig.numbers()
         }
-        for name in OPPOSING:
-            if name in known:
-                known[name] = max(known[name], 0.0)
+        known |= {n: max(known[n], 0.0) for n in OPPOSING if n in known}
         if not math.isfinite(known.get("w0", math.nan)):
             raise ValueError(f"{self.method} found no w0")
         return Rig(**known)

@@ -61,7 +61,6 @@ def from_peaks(peaks: Peaks, record: tuple[Floats, Floats]) -> Identification:
         zero += float(values[2])
     zeta = float(values[0]) / (2 * w0)
     period = frequency(small, zeta=min(abs(zeta), 0.9), offset=zero)
-    names = ("w0", "c_over_m", "Tr", "offset")
     estimates = np.array([period.w0, values[0], values[1], zero])
     # Energies are in units of w0^2: its error propagates to both dampings.
     full = np.zeros((4, 4))
@@ -81,7 +80,7 @@ def from_peaks(peaks: Peaks, record: tuple[Floats, Floats]) -> Identification:
             "are widened by it"
         )
     return identified(
-        names,
+        ("w0", "c_over_m", "Tr", "offset"),
         estimates,
         full,
         used=(

@@ -90,13 +90,10 @@ def from_peaks(peaks: Peaks) -> Identification:
     inner[1:, 1:] = covariance[1:, 1:]
     values = np.array([period.w0, delta, theta_r, zero])
     slopes = jacobian(si, values, np.sqrt(np.diag(inner)) / 10)
-    outer = slopes @ inner @ slopes.T
-    names = ("w0", "c_over_m", "Tr", "offset")
-    estimates = si(values)
     return identified(
-        names,
-        estimates,
-        outer,
+        ("w0", "c_over_m", "Tr", "offset"),
+        si(values),
+        slopes @ inner @ slopes.T,
         used=(
             f"peaks {small.index[0]} to {small.index[-1]} ({count}, under {math.degrees(CUT):.3g} "
             "degrees), all of them, and their times"
