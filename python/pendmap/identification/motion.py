@@ -31,7 +31,7 @@ class Motion:
     """Equation of motion of a fitted pendulum."""
 
     model: Rig  # Model with its effects
-    own: Mapping[str, float]  # Values that replace the model's parameters
+    own: Mapping[str, float]  # Values of the model's parameters, and of sensors by their run
 
     @classmethod
     def of(cls, fit: TrajectoryFit) -> Motion:
@@ -71,7 +71,7 @@ def _fit_motion(
     return fit_runs(
         whole,
         motion.model,
-        tuple(motion.own),
+        tuple(name for name in motion.own if name in OWN),
         start=motion.own,
         windows=windows,
         profiled=(),

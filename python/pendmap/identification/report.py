@@ -245,7 +245,8 @@ def left_out(experiment: Experiment, read: Sequence[Run]) -> str:
             return "of peaks alone"
         return "held out" if run.hold_out else "shorter" if run.moves else "at rest"
 
-    reasons = Counter(reason(run) for run in experiment.runs if all(run is not r for r in read))
+    names = {run.name for run in read}
+    reasons = Counter(reason(run) for run in experiment.runs if run.name not in names)
     texts = [f"{count} {why}" for why, count in reasons.items()]
     return f"{counted(len(read), 'run')} read; not used: {', '.join(texts)}" if texts else ""
 
