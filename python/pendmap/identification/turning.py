@@ -216,7 +216,7 @@ def swinging(time: Floats, theta: Floats) -> tuple[Floats, Floats]:
 
 def samples_per_period(time: Floats, theta: Floats) -> float:
     """Return the number of samples per period of small swings; infinite if no swing is seen."""
-    start = rough_start(time, theta, 0.0)
+    start = rough_start(time, theta, 0.0) if theta.size >= _FEWEST else None
     if start is None:
         return math.inf
     return math.tau / (start["w0"] * float(np.median(np.diff(time))))

@@ -261,7 +261,7 @@ def test_weights_halve_the_errors_and_match_the_scatter(fine: np.ndarray) -> Non
     for seed in range(10):
         theta = late(fine, 2.5e-3, 1e-3, seed)
         reading = reading_of(TIME, theta, count=0.0)
-        alike = dataclasses.replace(reading, each=reading.alike)
+        alike = dataclasses.replace(reading, each=np.full_like(reading.each, reading.sigma))
         result = trajectory_of(TIME, theta)
         other, _ = fit_from_start([FitRun(TIME, theta, alike.each)], [alike])
         assert any("missed their stamps by 2." in warning for warning in result.warnings)
