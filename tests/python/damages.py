@@ -238,7 +238,7 @@ DESCRIPTIONS = {
     "file that is not there": ('[[run]]\nfile = "other.csv"\n', "other.csv"),
     "folder for a file": ('[[run]]\nfile = "."\n', "is a folder"),
     "unknown table": (RUN + "[rigs]\nw0 = 6\n", "perhaps rig is meant"),
-    "unknown rig key": (RUN + "[rig]\nlength = 0.2\n", "perhaps length_m is meant"),
+    "unknown rig key": (RUN + "[rig]\nlenght_m = 0.2\n", "perhaps length_m is meant"),
     "unknown run key": (RUN + "lab_time = 3\n", "perhaps lab_time_s is meant"),
     "drive in millimetres": (RUN + "drive = { stroke_mm = 20, Omega = 3 }\n", r"p = Y Omega\^2/g"),
     "drive in hertz": (RUN + "drive = { p = 0.1, frequency_hz = 3 }\n", "Omega = 2 pi f"),

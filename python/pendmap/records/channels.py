@@ -269,7 +269,8 @@ def _suggestion(head: str, channels: Collection[str], plan: RunPlan) -> list[Fin
     """Return the finding that a heading suggests: a motor, an angle or a pivot."""
     heading, words = Heading.of(head), plain(head)
     unit = spelling(heading.unit or "")
-    if (heading.meaning in {"drive", "motor"} or unit in MOTOR_UNITS) and plan.kind == "free":
+    driven = {"drive", "motor"} & {*heading.meanings} and "pivot" not in heading.meanings
+    if (driven or unit in MOTOR_UNITS) and plan.kind == "free":
         return [finding_of("motor-column", head=head)]
     bare = "angle" not in channels and "peaks" not in channels
     if bare and (heading.meaning in {"angle", "position"} or unit in ANGLES):

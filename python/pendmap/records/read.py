@@ -290,7 +290,8 @@ def _runs(  # noqa: PLR0913, PLR0917 (what is known of the file)
     table, digest = tables[plan.file]
     named = any(column.name for column in description.columns.values())
     parts, shared = list[Work](), list[Finding]()
-    for beside in [table] if named else side_by_side(table):
+    blocks = [table] if named else side_by_side(table)
+    for beside in blocks:
         work = channels_of(beside, description, plan, str(path))
         refuse_unused(work)
         apply(RULES, work)
@@ -301,9 +302,10 @@ def _runs(  # noqa: PLR0913, PLR0917 (what is known of the file)
     for k, part in enumerate(parts, 1):
         apply(OF_RELEASE, part)
         runs.append(_run(part, f"{name} {k}/{len(parts)}" if len(parts) > 1 else name, digest))
-    heads = {channel: table.names[place] for channel, place in work.places.items()}
+    places = work.places if len(blocks) == 1 else {}
+    heads = {channel: table.names[place] for channel, place in places.items()}
     alone = {head for head in heads.values() if head and table.names.count(head) == 1}
-    taken[plan.file] = {c: h if h in alone else work.places[c] + 1 for c, h in heads.items()}
+    taken[plan.file] = {c: h if h in alone else places[c] + 1 for c, h in heads.items()}
     return runs, [dataclasses.replace(finding, where=finding.where or name) for finding in shared]
 
 

@@ -128,7 +128,7 @@ def gain_interval(periods: Periods) -> tuple[float, float]:
     share, error = share_of(periods, growth(periods.amplitude))
     least, most = share - Z95 * error, share + Z95 * error
     # Of wide swings the growth is more than the square of the angle.
-    wide = factor_of(periods, share)[0] / math.sqrt(share) if share > 3 * error else 1.0
+    wide = factor_of(periods, share)[0] / math.sqrt(share) if share > max(3 * error, 0.0) else 1.0
     low = 1 / (wide * math.sqrt(max(most, LEAST_GROWTH)))
     return low, 1 / (wide * math.sqrt(least)) if least > 0 else math.inf
 
@@ -256,9 +256,10 @@ def curvature(work: Work) -> Finding | None:
     if largest > LARGEST_SWING or np.ptp(grown) < 2e-3:
         return None
     low, high = gain_interval(periods)
-    if low <= 1 + GAIN_KNOWN and high >= 1 - GAIN_KNOWN:
-        return None
     share, error = share_of(periods, grown)
+    unknown = Z95 * error > 2 * GAIN_KNOWN  # the gain is the root of the share
+    if unknown or (low <= 1 + GAIN_KNOWN and high >= 1 - GAIN_KNOWN):
+        return None
     factor, spread = factor_of(periods, share)
     return work.finding(
         "angle-unit.flat" if share < 0.1 else "angle-scale",

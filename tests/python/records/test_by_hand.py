@@ -135,11 +135,8 @@ def test_an_invalid_value_is_refused_in_one_line(
 @pytest.mark.parametrize(
     ("content", "given"),
     [
-        (text((OTHER, TIME, THETA), "a,b,c"), {}),
         (text((OTHER, THETA), "a,b"), {}),
         (text((0 * TIME, THETA), ""), {}),
-        (text((TIME, OTHER, THETA), "t_s,a,b"), {}),
-        (text((0 * TIME, TIME, THETA), "angle,t_s,theta_deg"), {}),
         (text((TIME, 1e6 * THETA), "t_s,theta_rad"), {}),
         (text((0 * TIME, THETA), "t_s,theta_rad"), {}),
         (text((OTHER, THETA), "t_s,theta_rad"), {}),
@@ -158,6 +155,23 @@ def test_a_refused_file_is_read_by_the_line_that_refuses_it(
     line = called.stderr.strip()
     called = pendmap_command(*shlex.split(line[line.index("pendmap look") :])[1:])
     assert called.returncode == 0, (line, called.stderr)
+
+
+@pytest.mark.parametrize(
+    ("columns", "names"),
+    [
+        ((OTHER, TIME, THETA), "a,b,c"),
+        ((TIME, OTHER, THETA), "t_s,a,b"),
+        ((0 * TIME, TIME, np.degrees(THETA)), "angle,t_s,theta_deg"),
+    ],
+)
+def test_columns_whose_names_say_nothing_are_taken_by_their_values(
+    tmp_path: Path, columns: tuple[Any, ...], names: str
+) -> None:
+    (tmp_path / "run.csv").write_text(text(columns, names), encoding="utf-8")
+    (run,) = pendmap.read_experiment(tmp_path / "run.csv")
+    np.testing.assert_allclose(run.theta, THETA, atol=2e-6)
+    assert any(finding.what == "columns-guessed" for finding in run.findings)
 
 
 def test_times_that_look_like_milliseconds_are_not_cut_in_seconds(tmp_path: Path) -> None:

@@ -63,7 +63,7 @@ FILES: dict[str, tuple[list[str], str]] = {
     "one without am and pm": (["Time,Angle", *lines("{n:%I:%M:%S.%f},{a:.5f}")], "Time Angle"),
     "minutes and seconds": (["Time,Angle", *lines("{m}:{t:05.2f},{a:.5f}")], "Time Angle"),
     "commas of logging": (["Time,Angle", *[re.sub(r"\.(\d{3})\d+,", r",\1,", line) for line in lines("{d:%H:%M:%S.%f},{a:.5f}")]], "Time Angle"),
-    "dates, day first": (["Datum;Winkel", *lines("{d:%d.%m.%Y %H:%M:%S.%f};{a:.5f}")], "t_s Winkel"),
+    "dates, day first": (["Datum;Winkel", *lines("{d:%d.%m.%Y %H:%M:%S.%f};{a:.5f}")], "Datum Winkel"),
     "dates, month first": (["Date,Angle", *lines("{d:%m/%d/%Y %I:%M:%S.%f %p},{a:.5f}")], "t_s Angle"),
     "dates with names of months": (["angle,when", *lines("{a:.5f},{d:%d %b %Y %H:%M:%S.%f}")], "t_s angle"),
     "date and time apart": (["Date,Time,Angle", *lines("{d:%d/%m/%Y},{d:%H:%M:%S.%f},{a:.5f}")], "Time Angle"),
