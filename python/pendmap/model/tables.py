@@ -50,9 +50,11 @@ def model_arguments(
 
 
 def _check_top(content: dict[str, Any]) -> None:
-    tables = "[pendulum], [[formula]], [[effect]], [covariance], [provenance] and format_version"
-    shown = {f"[{key}]" if isinstance(content[key], dict) else key: key for key in content}
-    check_keys("", [name for name, key in shown.items() if key not in TOP], (), tables)
+    unknown = [key for key in content if key not in TOP]
+    if unknown:
+        shown = f"[{unknown[0]}]" if isinstance(content[unknown[0]], dict) else unknown[0]
+        tables = "[pendulum], [[formula]], [[effect]], [covariance], [provenance]"
+        raise InputError(f"{shown} is not known: it must be one of {tables} and format_version")
     version = content.get("format_version", FORMAT)
     check_whole("format_version", version, 1, FORMAT)
     check_notes({name: content[name] for name in NOTES if name in content})

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import re
 from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar
 
 from pendmap.errors import (
@@ -32,7 +31,6 @@ NAME: Final = "experiment.toml"
 RATE: Final = "rate_hz"
 LARGEST: Final = 1e12  # Greatest magnitude of a number in a description
 NUMBER: Final = (-LARGEST, LARGEST)
-COUNTS: Final = re.compile("counts?|ticks?", re.IGNORECASE)
 COLUMN: Final = object()  # Rule of a heading, or of the number of a column from 1
 POSITIVE: Final = (1 / LARGEST, LARGEST)
 RATES: Final = (1e-3, 1e9)  # Sampling rates, Hz
@@ -138,20 +136,16 @@ def description_of(content: dict[str, Any]) -> Description:
     if not isinstance(runs, list) or not runs:
         raise InputError('must have one [[run]] or more, each with file = "run_00.csv", got none')
     plans = tuple(_run(f"[[run]] {count}", table) for count, table in enumerate(runs, 1))
-    columns = _table("[columns]", content.get("columns", {}))
+    columns = {**_table("[columns]", content.get("columns", {}))}
     check_keys("[columns]: ", columns, (*CHANNELS, RATE))
     rig = dataclasses.asdict(_parsed(Rig, "[rig]", content.get("rig", {})))
     counts = rig["encoder_counts"] is not None
-    reader = _reader(content.get("reader", {}))
+    rate = columns.pop(RATE, None)
     return Description(
         {name: value for name, value in rig.items() if value is not None},
-        {
-            name: _column(name, value, counts=counts)
-            for name, value in columns.items()
-            if name != RATE
-        },
-        checked(f"[columns]: {RATE}", columns[RATE], RATES) if RATE in columns else None,
-        reader,
+        {name: _column(name, value, counts=counts) for name, value in columns.items()},
+        None if rate is None else checked(f"[columns]: {RATE}", rate, RATES),
+        _reader(content.get("reader", {})),
         plans,
     )
 
@@ -225,7 +219,7 @@ def _column(channel: str, value: object, *, counts: bool) -> Column:
         raise InputError(f"{where}: scale must be any number but 0, got 0")
     if column.unit is None or column.scale is not None:
         return column
-    if counts and channel == "angle" and COUNTS.fullmatch(column.unit):
+    if counts and channel == "angle" and spelling(column.unit) == "counts":
         return column
     angular = spelling(column.unit) in ANGULAR_ACCELERATIONS
     if column.direction is not None and angular != (column.direction == "angular"):

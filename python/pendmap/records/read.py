@@ -172,18 +172,15 @@ def experiment_of(
         raise InputError(f"records must be {_FORMS}, got {short_repr(records)}")
     if len(parts) == 1:
         return parts[0]
-    known = dict(parts[0].known)
-    for part in parts[1:]:
-        for name, value in part.known.items():
-            if known.setdefault(name, value) != value:
-                raise InputError(
-                    f"{name} must be one for all records, got {known[name]} and {value}"
-                )
+    known = dict[str, Any]()
+    for name, value in (pair for part in parts for pair in part.known.items()):
+        if known.setdefault(name, value) != value:
+            raise InputError(f"{name} must be one for all records, got {known[name]} and {value}")
     runs, before = list[Run](), Counter[str]()
-    for run in (run for part in parts for run in part.runs):
+    for run in (run for part in parts for run in part):
         before[run.name] += 1
-        name = f"{run.name} ({before[run.name]})" if before[run.name] > 1 else run.name
-        runs.append(run if name == run.name else dataclasses.replace(run, name=name))
+        number = f" ({before[run.name]})" if before[run.name] > 1 else ""
+        runs.append(dataclasses.replace(run, name=run.name + number))
     unique, together = checked_together(runs)
     findings = dict.fromkeys([*(finding for part in parts for finding in part.findings), *together])
     place = Path(listed([part.path.name for part in parts], _SHOWN))
@@ -230,13 +227,13 @@ def _described(place: Path, content: dict[str, Any]) -> Description:
 
 def _every(place: Path, description: Description) -> tuple[list[Run], list[Finding]]:
     """Read all runs; in a folder without a description, leave out files that are no records."""
-    plans, described = description.runs, (place / NAME).is_file()
+    described = (place / NAME).is_file()
     plain = place.is_dir() and not described
-    runs, findings, refused = list[Run](), list[Finding](), list[str]()
-    if plain:
-        findings.append(finding_of("no-description"))
+    runs, findings = list[Run](), [finding_of("no-description")] * plain
     tables: dict[str, tuple[Table, str]] = {}
-    for count, (plan, name) in enumerate(zip(plans, _names(plans), strict=True), 1):
+    refused = list[str]()
+    names = zip(description.runs, _names(description.runs), strict=True)
+    for count, (plan, name) in enumerate(names, 1):
         path = place / plan.file if place.is_dir() else place
         if described and not path.exists():
             raise InputError(f"{place / NAME}: [[run]] {count}: no file {plan.file!r}")
@@ -244,14 +241,12 @@ def _every(place: Path, description: Description) -> tuple[list[Run], list[Findi
             if plan.file not in tables:
                 tables = {plan.file: read_table(path, description.reader)}
             of_file, shared = _runs(tables[plan.file], plan, description, str(path), name)
+            runs, findings = runs + of_file, findings + shared
         except InputError as error:
             if not plain:
                 raise
             refused.append(str(error))
             findings.append(finding_of("file-left-out", error=error))
-        else:
-            runs += of_file
-            findings += shared
     if not runs:
         got = f"{counted(len(refused), 'file')}, the first refused: {refused[0]}"
         raise InputError(_NO_RECORD.format(place=place, got=got))
