@@ -179,6 +179,12 @@ def test_columns_whose_names_say_nothing_are_taken_by_their_values(
     assert any(finding.what == "columns-guessed" for finding in run.findings)
 
 
+def test_without_names_noise_is_no_angle(tmp_path: Path) -> None:
+    (tmp_path / "run.csv").write_text(text((TIME, OTHER, -OTHER), ""), "utf-8")
+    with pytest.raises(pendmap.InputError, match=r"no column of angles: .* --angle 2$"):
+        pendmap.read_experiment(tmp_path / "run.csv")
+
+
 def test_times_that_look_like_milliseconds_are_not_cut_in_seconds(tmp_path: Path) -> None:
     (tmp_path / "run.csv").write_text(text((1e3 * TIME, THETA), "Time,theta_rad"), "utf-8")
     with pytest.raises(pendmap.InputError, match=r"--time-unit milliseconds$"):
