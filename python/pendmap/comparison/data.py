@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.errors import InputError
-from pendmap.identification.readings import Reading, as_fit_run, reading_of
+from pendmap.identification.readings import Reading, as_fit_run, reading_of_run
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from pendmap.identification.runs import FitRun
     from pendmap.records import Experiment, Run
@@ -31,11 +31,11 @@ FINEST: Final = 1e-7
 """Lower bound on the noise, rad, below that of any sensor; covers errors of local polynomials."""
 BLOCKS: Final = 50
 """Fewest blocks in a swing or turn, so that noise and motion are separate in the spectrum."""
+MOST: Final = 30_000  # Most readings that are fitted; of more, every second or further one is
 FEWEST_BLOCKS: Final = 1000
 """Fewest blocks of a record; with fewer readings the integrator's own steps dominate the cost."""
 LEAST_OF_BLOCK: Final = 3  # Fewest readings of a block
 OF_ACCELERATION: Final = "computed from an acceleration, whose own errors are not among the effects"
-OF_RATE: Final = "an integrated velocity, whose errors add up"
 NEIGHBOURS: Final = 2  # Blocks on either side to which a parabola is fitted
 
 
@@ -63,8 +63,12 @@ class DataSplit:
     def floors(self) -> tuple[float, ...]:
         """Share of rounding (white, variance ``count^2 / 12``) in each fitted run's noise."""
         pairs = zip(self.fitted_of, self.fitted, strict=True)
+        # The rounding of a block's mean is that of one reading over the number of readings.
         return tuple(
-            self.readings[k].count ** 2 / 12 / float(np.mean(np.square(run.sigma)))
+            self.readings[k].count ** 2
+            / 12
+            / float(np.mean(np.square(run.sigma)))
+            / max(self.runs[k].time.size // run.time.size, 1)
             for k, run in pairs
         )
 
@@ -90,9 +94,10 @@ def split_records(experiment: Experiment) -> DataSplit:
     experiment.refuse_still(runs)
     runs = tuple(run for run in runs if run.moves)
     for run in runs:
-        for sensor, why in ((run.accelerometer, OF_ACCELERATION), (run.gyroscope, OF_RATE)):
-            if sensor is not None:
-                raise InputError(f"{run.name}: its angle is {why}: it must be a measured angle")
+        if run.accelerometer is not None:
+            raise InputError(
+                f"{run.name}: its angle is {OF_ACCELERATION}: it must be a measured angle or rate"
+            )
         if run.kind == "forced" and not (run.drive or run.pivot):
             raise InputError(f"{run.name}: a forced run must have drive or pivot, neither is given")
     readings = _readings(runs)
@@ -100,6 +105,8 @@ def split_records(experiment: Experiment) -> DataSplit:
         average_blocks(as_fit_run(run, reading))
         for run, reading in zip(runs, readings, strict=True)
     ]
+    step = math.ceil(sum(run.time.size for run in every) / MOST)
+    every = [samples_of(run, slice(None, None, step)) if step > 1 else run for run in every]
     marked = [k for k, run in enumerate(runs) if run.hold_out] or _middle_runs(every)
     if not marked:
         return _hold_stretches(experiment, runs, readings, every)
@@ -116,20 +123,16 @@ def _readings(runs: Sequence[Run]) -> tuple[Reading, ...]:
 
     A run too short to estimate it has the median of the others, since one sensor reads all runs.
     """
-
-    def own(run: Run, sigma: float | None = None) -> Reading:
-        return reading_of(run.time, run.theta, sigma, trusted=run.trusted, count=run.count_rad)
-
-    every = [own(run) for run in runs]
+    every = [reading_of_run(run) for run in runs]
     known = [reading for reading in every if reading.doubt <= KNOWN]
     if known:
         usual = float(np.median([reading.sigma for reading in known]))
         doubt = max(reading.doubt for reading in known)
         for k, run in enumerate(runs):
             if every[k].doubt > KNOWN:
-                every[k] = dataclasses.replace(own(run, usual), doubt=doubt)
+                every[k] = dataclasses.replace(reading_of_run(run, usual), doubt=doubt)
     return tuple(
-        reading if reading.sigma >= FINEST else own(run, FINEST)
+        reading if reading.sigma >= FINEST else reading_of_run(run, FINEST)
         for run, reading in zip(runs, every, strict=True)
     )
 
@@ -186,7 +189,16 @@ def samples_of(run: FitRun, which: Mask | slice) -> FitRun:
     """Return a run with only some of its samples."""
     time, theta, sigma = run.time[which], run.theta[which], run.sigmas[which]
     good = run.counted[which]
-    return dataclasses.replace(run, time=time, theta=theta, sigma=sigma, trusted=good)
+    part = dataclasses.replace(run, time=time, theta=theta, sigma=sigma, trusted=good)
+    return _with_angle(part, lambda angle: angle[which])
+
+
+def _with_angle(run: FitRun, of: Callable[[Floats], Floats]) -> FitRun:
+    """Return a run with other samples of the angle that was computed from its readings, if any."""
+    if run.rod_sensor is None:
+        return run
+    sensor = dataclasses.replace(run.rod_sensor, angle=of(run.rod_sensor.angle))
+    return dataclasses.replace(run, rod_sensor=sensor)
 
 
 def average_blocks(run: FitRun) -> FitRun:
@@ -195,25 +207,28 @@ def average_blocks(run: FitRun) -> FitRun:
     With weights ``w``, one over the squared errors, ``sum(w x)/sum(w)`` at the mean time has the
     error ``sum(w)^(-1/2)``. The bias ``var(t) a/2``, with the acceleration ``a`` of the parabola
     through five blocks, is subtracted; the remaining error, of order ``T^4/60`` times the fourth
-    derivative in a block of length ``T``, is ``1e-6`` of a swing. Counts, which give intervals of
-    the angle, are not averaged.
+    derivative in a block of length ``T``, is ``1e-6`` of a swing. Rounding to counts of ``q`` has
+    the error ``q / sqrt(12)``, that of the mean of a ramp over ``m`` counts ``q / (m sqrt(120))``.
     """
-    if run.count is not None:
-        return run
     weights = np.where(run.counted, run.sigmas**-2.0, 0.0)
     for size in range(run.time.size // FEWEST_BLOCKS, LEAST_OF_BLOCK - 1, -1):
-        blocks = _block_means(run.time, run.theta, weights, size)
-        if _dense(*blocks[:3]):
+        angles = _block_means(run.time, run.angle, weights, size)
+        if _dense(*angles[:3]):
             break
     else:
         return run
-    time, theta, weight, variance = blocks
+    time, theta, weight, variance = _block_means(run.time, run.theta, weights, size)
     good = weight > 0
     # Excluded blocks must not bend the parabolas of their neighbours.
     known = np.where(good, theta, np.interp(time, time[good], theta[good]))
     theta = theta - 0.5 * variance * _curvature(time, known)
     sigma = np.where(good, weight, np.median(weight[good])) ** -0.5
-    return dataclasses.replace(run, time=time, theta=theta, sigma=sigma, trusted=good)
+    if run.count is not None:
+        parts = run.theta[: time.size * size].reshape(-1, size)
+        passed = math.sqrt(10) * (np.ptp(parts, axis=1) / run.count - 1)
+        sigma = np.hypot(sigma, run.count / math.sqrt(12) / np.clip(passed, 1, math.sqrt(size)))
+    means = dataclasses.replace(run, time=time, theta=theta, sigma=sigma, trusted=good, count=None)
+    return _with_angle(means, lambda _: angles[1])
 
 
 def _block_means(

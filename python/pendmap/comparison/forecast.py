@@ -168,6 +168,8 @@ def _errors(model: Fits, launches: list[_Launch], swing: float, count: int) -> F
         for runs in ([one.before for one in launches], [one.whole for one in launches])
     )
     motion = Motion.of(model.fitted)
+    sensors = model.held.sensors_of([one.place for one in launches])
+    motion = dataclasses.replace(motion, own={**motion.own, **sensors})
     states = fit_states(motion, before, [_guess(run, swing) for run in before])
     squares, samples = np.zeros(count), np.zeros(count)
     for one, (readings, _) in zip(launches, run_forward(motion, whole, states), strict=True):
@@ -182,7 +184,7 @@ def _guess(run: FitRun, swing: float) -> tuple[float, float]:
     """Return angle and velocity at a run's first sample, from a parabola."""
     time = run.time - run.time[0]
     near = max(int(np.searchsorted(time, BEGIN * swing)), 3)
-    slope, angle = np.polyfit(time[:near], run.theta[:near], min(2, near - 1))[-2:]
+    slope, angle = np.polyfit(time[:near], run.angle[:near], min(2, near - 1))[-2:]
     return float(angle), float(slope)
 
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.diagnosis.candidates import CORE, Candidate
+from pendmap.comparison.forecast import noise_rms, share_closed
+from pendmap.diagnosis.candidates import CORE, ZERO, Candidate
 from pendmap.diagnosis.fitted_model import (
     FittedModel,
     converge,
@@ -18,18 +20,26 @@ from pendmap.diagnosis.fitted_model import (
     none_if_diverged,
 )
 from pendmap.diagnosis.refit import best_of, drop_effect
+from pendmap.diagnosis.thresholds import Thresholds
 from pendmap.errors import InputError
+from pendmap.identification.parameters import OPPOSING
 from pendmap.identification.turning import rough_start
 from pendmap.model import Rig
+from pendmap.model.effects import library
 from pendmap.model.rig import own_name
+from pendmap.tables.findings import finding_of
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
+    from collections.abc import Collection, Sequence
 
     from pendmap.comparison.data import DataSplit
 
-POOR: Final = 0.1
-"""Residual, over the standard deviation of the angle, above which a fit does not follow it."""
+LOST: Final = 0.1  # Residual of a run, over its swing, above which a fit does not follow it
+POOR: Final = 20.0  # Residual over the noise above which each effect of damping is fitted
+WINDOWS: Final = 4  # Windows in which a run is fitted that is lost as one motion
+DAMPING: Final = ("cubic_damping", "power_law_drag", "eddy_brake", "load_dependent_friction")
+"""Effects that oppose the motion at any place and time, besides that of the core."""
+BEGIN: Final = 0.01  # Nondimensional size at which a fit of an effect of damping begins
 
 
 def fit_baseline(
@@ -51,9 +61,11 @@ def fit_baseline(
         base = fit_model(data, rig, [*free, *sizes])
     else:
         free = ["w0", "c_over_m", "Tr"]
-        first = _start(data)
-        base = _through_all(data, first, free) or fit_model(data, first, free)
-    added = [c for c in map(Candidate, CORE) if c.name not in {*base.taken, *without}]
+        rig = _start(data)
+        base = _through_all(data, rig, free) or fit_model(data, rig, free)
+    rates = all(run.rod_sensor is not None for run in data.fitted)
+    known = {*base.taken, *without, *([ZERO] if rates else [])}  # a rate has no zero of the angle
+    added = [candidate for candidate in map(Candidate, CORE) if candidate.name not in known]
     if not added:
         return base, None
     start = {candidate.free[0]: 0.0 for candidate in added}
@@ -69,13 +81,92 @@ def fit_baseline(
     reduced: FittedModel | None = core
     for candidate in added:
         reduced = reduced and drop_effect(data, reduced, candidate, core.level)
-    return best_of(base, reduced) or base, impose_physics(data, core)
+    base = best_of(base, reduced) or base
+    core = impose_physics(data, core)
+    before, noise = best_of(base, core) or base, noise_rms(data.fitted)
+    if before.fit.rms < POOR * noise:
+        return base, core
+    # Far above the noise scores are no guide: all effects of damping are fitted.
+    names = [name for name in DAMPING if name not in {*base.taken, *without}]
+    other = best_of(*(_fit_outright(data, base, name, rig) for name in names))
+    share = 0.0 if other is None else share_closed(before.fit.rms, other.fit.rms, noise)
+    return base, other if share >= Thresholds().closes else core
+
+
+def fit_followed(
+    data: DataSplit, model: Rig | None = None, without: Collection[str] = ()
+) -> tuple[DataSplit, FittedModel, FittedModel | None]:
+    """Return records that a model follows, and the fits of :func:`fit_baseline` to them.
+
+    A run that is lost is fitted in windows, and set aside if it is lost there too.
+    """
+    base, core = fit_baseline(data, model, without)
+    for change in (in_windows, set_aside):
+        lost = lost_runs(data, best_of(base, core) or base)
+        if lost and (changed := change(data, lost)) is not None:
+            data = changed
+            base, core = fit_baseline(data, model, without)
+    return data, base, core
+
+
+def in_windows(data: DataSplit, lost: Sequence[int]) -> DataSplit:
+    """Return records with shorter windows in the lost free runs."""
+    fitted = list(data.fitted)
+    for k in (k for k in lost if not fitted[k].forced):
+        longest = float(np.ptp(fitted[k].time)) / WINDOWS
+        fitted[k] = dataclasses.replace(fitted[k], longest_s=longest)
+    return dataclasses.replace(data, fitted=tuple(fitted))
+
+
+def set_aside(data: DataSplit, lost: Sequence[int]) -> DataSplit | None:
+    """Return records without the lost runs, with a finding about each; None if none remains."""
+    places = [k for k in range(len(data.fitted)) if k not in lost]
+    out = {data.fitted_of[k] for k in lost}
+    held = [k for k, of in enumerate(data.held_of) if of not in out]
+    if not places or not held:
+        return None
+    runs = list(data.runs)
+    for k in out:
+        finding = finding_of("run-lost", where=runs[k].name, percent=100 * LOST)
+        runs[k] = dataclasses.replace(runs[k], findings=(*runs[k].findings, finding))
+    return dataclasses.replace(
+        data,
+        runs=tuple(runs),
+        fitted=tuple(data.fitted[k] for k in places),
+        fitted_of=tuple(data.fitted_of[k] for k in places),
+        held=tuple(data.held[k] for k in held),
+        held_of=tuple(data.held_of[k] for k in held),
+    )
+
+
+def _fit_outright(data: DataSplit, base: FittedModel, name: str, begin: Rig) -> FittedModel | None:
+    """Return the baseline with an effect, fitted from short windows; None if it diverges."""
+    effect = Candidate(name, {e.name: e.middle for e in library()[name].parameters if e.is_shape})
+    size = {effect.free[0]: effect.effect(begin.units, BEGIN).parameters[effect.size]}
+    rough: dict[str, float] = {n: getattr(begin, n) for n in ("w0", *OPPOSING) if n in base.free}
+    fits = (
+        fit_with_candidates(data, base, [effect], size | known, level=base.level, short=True)
+        for known in ({}, rough)
+    )
+    fit = best_of(*fits)
+    fit = fit and converge(data, fit, fit.level)
+    return fit and impose_physics(data, fit)
+
+
+def lost_runs(data: DataSplit, fitted: FittedModel) -> list[int]:
+    """Return the places of the runs that a model does not follow."""
+    lost = []
+    for k, (run, residual) in enumerate(zip(data.fitted, fitted.fit.residuals, strict=True)):
+        good = np.isfinite(residual) & run.counted
+        swing = min(float(np.ptp(run.theta[run.counted])) / 2, math.pi)
+        if not good.any() or float(np.mean(residual[good] ** 2)) > (LOST * swing) ** 2:
+            lost.append(k)
+    return lost
 
 
 def follows(data: DataSplit, fitted: FittedModel) -> bool:
-    """Return whether a model follows the motion: whether its residual is small over the angle."""
-    scatter = np.mean([float(np.std(run.theta)) for run in data.fitted])
-    return fitted.fit.rms <= POOR * float(scatter)
+    """Return whether a model follows all runs."""
+    return not lost_runs(data, fitted)
 
 
 @none_if_diverged
@@ -114,7 +205,7 @@ def _start(data: DataSplit) -> Rig:
     free = [(run, k) for run, k in free if not run.forced]
     for run, k in sorted(free, key=lambda pair: -float(np.ptp(pair[0].time))):
         good = run.counted
-        rough = rough_start(run.time[good], run.theta[good], data.readings[k].sigma)
+        rough = rough_start(run.time[good], run.angle[good], data.readings[k].sigma)
         if rough is not None:
             return Rig(
                 w0=known or rough["w0"],

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from pendmap.analysis.run import in_rounds
 from pendmap.comparison.data import split_records
 from pendmap.comparison.forecast import Reasons, compute_gap, compute_part
-from pendmap.diagnosis.baseline import fit_baseline
+from pendmap.diagnosis.baseline import fit_followed
 from pendmap.diagnosis.candidates import checked_own
 from pendmap.diagnosis.fitted_model import settles
 from pendmap.diagnosis.named import name_effects
@@ -112,9 +112,7 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
     moved = in_rounds(progress, _FITS) or (lambda _done, _total: None)
     data = split_records(experiment)
     with _refuse_divergence(experiment):
-        base, core = fit_baseline(data, model, without)
-    # Windows are as long as those over which the baseline followed the runs.
-    data = dataclasses.replace(data, fitted=base.runs)
+        data, base, core = fit_followed(data, model, without)
     moved(1, 1)
     most = 0 if "rigs-differ" in doubt_keys(experiment) else max_effects
     state = State(data, base, thresholds or Thresholds(), most, without, formulas=formulas)
@@ -127,6 +125,7 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
         same: dict[str, Any] = {"effects": effects, "thresholds": thresholds, "progress": progress}
         return diagnose(shorter, model=model, max_effects=most, without=without, **same)
     with _refuse_divergence(experiment):
+        last = last if last.chosen or most == 0 else state.physical_core(core) or last
         begin = state.scored(state.begun)
         if not doubt_keys(experiment, *data.runs) & UNIT_FINDINGS:
             refuse_astray(experiment.path, data.fitted, last.fit)

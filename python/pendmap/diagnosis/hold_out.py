@@ -10,6 +10,7 @@ import numpy as np
 from pendmap.diagnosis.fitted_model import FEW_STEPS, LITTLE
 from pendmap.errors import FitDiverged
 from pendmap.identification.fit import TrajectoryFit, fit_runs
+from pendmap.identification.parameters import SENSOR
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -37,7 +38,11 @@ def evaluate_hold_out(data: DataSplit, fitted: FittedModel) -> HoldOut:
     motion, without any step of a fit.
     """
     model, free = fitted.fit.model, fitted.free
-    known = {name: value for name, value in fitted.start.items() if "[" not in name}
+    known = {
+        name: value
+        for name, value in fitted.start.items()
+        if "[" not in name and name not in SENSOR
+    }
     if not any(run.drive for run in data.held):
         # Effects of the drive do not act without a harmonic drive.
         drives = {e.name for e in model.effects if e.drives}
@@ -45,13 +50,14 @@ def evaluate_hold_out(data: DataSplit, fitted: FittedModel) -> HoldOut:
     search: dict[str, Any] = {"steps": FEW_STEPS, "least_gain": LITTLE}
     if data.inside:
         free = tuple(name for name in free if name in known)
-        places = {of: k for k, of in enumerate(data.held_of)}
+        places = {data.fitted_of.index(of): k for k, of in enumerate(data.held_of)}
         windows = tuple((places[w[0]], *w[1:]) for w in fitted.fit.windows if w[0] in places)
+        known |= fitted.fit.sensors_of([data.fitted_of.index(of) for of in data.held_of])
         search = {"steps": 0, "windows": windows}
     fit = fit_runs(data.held, model, free, start=known, profiled=(), hold=True, **search)
     adapted = 0
     if not data.inside:
-        adapted = 2 * len(fit.windows) + len([n for n in fit.names if n.startswith("phi")])
+        adapted = 2 * len(fit.windows) + len(_of_runs(fit, 0))
     return HoldOut(fit.chi2, max(fit.samples - adapted, 1), fit)
 
 
@@ -66,13 +72,9 @@ def hold_out_losses(
     """
     if not data.inside:
         shifted = tuple((w[0] + len(data.fitted), *w[1:]) for w in held.fit.windows)
-        phases = {
-            f"phi[{int(n[4:-1]) + len(data.fitted)}]": e.value
-            for n, e in held.fit.estimates.items()
-            if n.startswith("phi[")
-        }
+        known = _of_runs(fitted.fit, 0) | _of_runs(held.fit, len(data.fitted))
         both = (*data.fitted, *data.held)
-        whole = _chi2(both, fitted, (*fitted.fit.windows, *shifted), level, phases)
+        whole = _chi2(both, fitted, (*fitted.fit.windows, *shifted), level, known)
         return (whole - fitted.chi2,)
     windows, back = fitted.fit.windows, dict(zip(data.held_of, data.held, strict=True))
     runs = tuple(
@@ -85,6 +87,16 @@ def hold_out_losses(
         for k in range(FOLDS + 2)
     ]
     return (sum(lost[:FOLDS]), *lost[FOLDS:])
+
+
+def _of_runs(fit: TrajectoryFit, first: int) -> dict[str, float]:
+    """Return phases and sensors of the runs of a fit, numbered from ``first``."""
+    values = {}
+    for name, estimate in fit.estimates.items():
+        kind, _, number = name.rstrip("]").partition("[")
+        if kind in {"phi", *SENSOR}:
+            values[f"{kind}[{first + int(number or 0)}]"] = estimate.value
+    return values
 
 
 def _without(run: FitRun, number: int) -> FitRun:
@@ -111,7 +123,7 @@ def _chi2(
     fitted: FittedModel,
     windows: Windows,
     level: float,
-    phases: dict[str, float] | None = None,
+    of_runs: dict[str, float] | None = None,
 ) -> float:
     """Return the least sum of squares of a model on other readings, from the fitted motion."""
     try:
@@ -119,7 +131,7 @@ def _chi2(
             runs,
             fitted.fit.model,
             fitted.free,
-            start=fitted.start | (phases or {}),
+            start=fitted.start | (of_runs or {}),
             windows=windows,
             profiled=(),
             steps=FEW_STEPS,

@@ -19,8 +19,9 @@ from pendmap.diagnosis.fitted_model import (
 )
 from pendmap.diagnosis.hold_out import HoldOut, evaluate_hold_out, hold_out_losses
 from pendmap.diagnosis.refit import add_effects, drop_effect, key_of, refit_with
-from pendmap.diagnosis.scores import Scores, score_candidates
+from pendmap.diagnosis.scores import Score, Scores, score_candidates
 from pendmap.errors import FitDiverged
+from pendmap.identification.experiment import CLOSED, MISSES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
@@ -63,6 +64,13 @@ class Attempt:
     )  # Least fall on a held-out set, in independent readings; None if unused
     accepted: bool  # Whether the search continued with them
     stage: int  # Number of effects before they were added
+
+
+def _opposing(score: Score) -> Score:
+    """Return a score, without gain if an effect that opposes the motion is expected below 0."""
+    size = next(iter(score.start.values()), 0.0)
+    drives = score.candidate.definition.opposing is not None and size < 0
+    return dataclasses.replace(score, gain=0.0) if drives else score
 
 
 class State:
@@ -165,7 +173,10 @@ class State:
         """Return the scores of all candidates at a fit."""
         if fitted not in self._scores:
             self.moved()
-            self._scores[fitted] = score_candidates(self.data, fitted, self._candidates(fitted))
+            scores = score_candidates(self.data, fitted, self._candidates(fitted))
+            self._scores[fitted] = dataclasses.replace(
+                scores, scores=tuple(map(_opposing, scores.scores))
+            )
         return self._scores[fitted]
 
     def _candidates(self, fitted: FittedModel) -> list[list[Candidate]]:
@@ -226,6 +237,23 @@ class State:
             for fitted in sorted((best, *alike), key=order)
             if fitted is best or self._loses_at_most(most, best, fitted)
         )
+
+    def physical_core(self, core: FittedModel | None) -> FittedModel | None:
+        """Return the smallest part of the core that closes half of the gap; None without one.
+
+        Coloured residuals have too few independent readings for a significant gain; instead no
+        held-out set may be predicted worse.
+        """
+        full = None if core is None else self.remember(self._fit_again(core))
+        if full is None or self.begun.fit.rms < MISSES * self.noise:
+            return None
+        parts = [*(self.leave_out(full, candidate) for candidate in full.chosen), full]
+        best = self.begun
+        for part in sorted(parts, key=lambda t: len(t.chosen)):
+            closed = share_closed(best.fit.rms, part.fit.rms, self.noise)
+            if part.chosen and closed >= 1 - CLOSED and self.keeps_hold_out(best, part):
+                best = part
+        return best if best.chosen else None
 
     def hold_out(self, fitted: FittedModel) -> HoldOut | None:
         """Return the hold-out evaluation of a model; None if it diverges."""
@@ -305,8 +333,9 @@ class State:
 
     def closed(self, reduced: FittedModel, full: FittedModel) -> float:
         """Return the share of the squared gap above the noise that further effects close."""
-        before = reduced if reduced.chosen else self.begun
-        return share_closed(before.fit.rms, full.fit.rms, self.noise)
+        # A model with more effects than the baseline that fits worse has lost the motion.
+        before = min(reduced.fit.rms, self.begun.fit.rms) if reduced.chosen else self.begun.fit.rms
+        return share_closed(before, full.fit.rms, self.noise)
 
     def keeps_hold_out(self, reduced: FittedModel, full: FittedModel) -> bool:
         """Return whether further effects worsen no held-out set.

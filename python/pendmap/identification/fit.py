@@ -14,6 +14,7 @@ from pendmap.identification.parameters import (
     OPPOSING,
     PER_RUN,
     PLACES,
+    SENSOR,
     Conversion,
     free_quantities,
     interval,
@@ -69,6 +70,16 @@ class TrajectoryFit:
         names = (name for name in opposing(self.model.effects) if name in self.estimates)
         return next((name for name in names if self[name] < 0), None)
 
+    def sensors_of(self, places: Sequence[int]) -> dict[str, float]:
+        """Return bias and tilt of some runs' sensors, named as in a fit to these runs alone."""
+        values = {}
+        for k, place in enumerate(places):
+            for name in SENSOR:
+                known = self.estimates.get(f"{name}[{place}]") or self.estimates.get(name)
+                if known is not None:
+                    values[f"{name}[{k}]" if len(places) > 1 else name] = known.value
+        return values
+
     def drive_of(self, run: FitRun, place: int) -> Mapping[str, float | None] | None:
         """Return a run's drive, with an unknown phase replaced by its fit (run ``place``), or 0."""
         if run.drive is None or run.drive.get("phi") is not None:
@@ -104,7 +115,8 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
     ``model`` gives fixed parameters and starting values; ``start`` replaces starting values, where
     damping may be negative. ``free`` has names of :class:`pendmap.Rig` and ``effect.parameter``;
     those of the drive are fitted run by run, as are unknown phases. ``hold`` fixes the parameters
-    at their starting values: only initial states and unknown phases are fitted. ``sigma_doubt`` is
+    at their starting values, also bias and tilt of sensors in ``start``: only initial states and
+    what is unknown of single runs are fitted. ``sigma_doubt`` is
     the relative standard error of ``sigma``, ``steps`` the maximum number of iterations in a stage;
     the search ends when the expected gain of a step is below ``least_gain``, or, with ``windows``,
     when the sum ``target`` is out of reach.
@@ -115,21 +127,23 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
     names, units = unknown.names, unknown.units
     wanted = names if profiled is None else profiled
     chosen = [k for k, n in enumerate(names) if {n, n.partition("[")[0]} & {*wanted}]
+    begun = {name.partition("[")[0] for name in start or ()}
+    held = {*free, *begun.intersection(SENSOR)} if hold else set()
     choices = {
         "tolerance": tolerance_of(runs),
         "shortest": units.w0 * (math.tau / model.w0),
         "growth": GROWTH,
         "steps": steps,
         "gain": least_gain,
-        "hold": len([n for n in names if n.partition("[")[0] in free]) if hold else 0,
+        "hold": len([n for n in names if n.partition("[")[0] in held]),
         "target": target,
         "profiled": [k for k in chosen if k not in unknown.mixed],
         "level": LEVEL,
         "doubt": sigma_doubt,
     }
-    begun = None if windows is None else bare_windows(windows, units)
+    first = None if windows is None else bare_windows(windows, units)
     with core_errors(FitDiverged):
-        fit = _core.fit_runs(given, unknown.start, choices, begun)
+        fit = _core.fit_runs(given, unknown.start, choices, first)
     return _result(fit, model, unknown, chosen, max(run.clock_stderr for run in runs))
 
 

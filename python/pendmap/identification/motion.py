@@ -31,7 +31,7 @@ class Motion:
     """Equation of motion of a fitted pendulum."""
 
     model: Rig  # Model with its effects
-    own: Mapping[str, float]  # Values that replace the model's parameters
+    own: Mapping[str, float]  # Values of the model's parameters, and of sensors by their run
 
     @classmethod
     def of(cls, fit: TrajectoryFit) -> Motion:
@@ -72,7 +72,7 @@ def _fit_motion(
     return fit_runs(
         whole,
         motion.model,
-        tuple(values),
+        tuple(name for name in values if name in OWN),
         start=values,
         windows=windows,
         profiled=(),

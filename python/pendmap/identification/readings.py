@@ -149,12 +149,12 @@ def as_angles(run: Run) -> Floats:
     return run.read / (1.0 if run.rod_sensor is None else run.rod_sensor.gain)
 
 
-def reading_of_run(run: Run) -> Reading:
+def reading_of_run(run: Run, sigma: float | None = None) -> Reading:
     """Return the standard errors of a run's readings; see :func:`reading_of`."""
     time, sensor = from_first(run.time)[0], run.rod_sensor
     if sensor is None:
-        return reading_of(time, run.theta, trusted=run.trusted, count=run.count_rad)
-    reading = reading_of(time, as_angles(run), trusted=run.trusted)
+        return reading_of(time, run.theta, sigma, trusted=run.trusted, count=run.count_rad)
+    reading = reading_of(time, as_angles(run), sigma, trusted=run.trusted)
     law = reading.law
     if law is not None and run.gyroscope is not None:
         # The error of a rate by jitter is proportional to the acceleration.

@@ -236,7 +236,7 @@ def left_out(experiment: Experiment, read: Sequence[Run]) -> str:
     # If held-out runs are used too, being held out is no reason.
     held_too = any(used_run.hold_out for used_run in read)
     for run in experiment.runs:
-        if any(run is used_run for used_run in read):
+        if any(run.name == used_run.name for used_run in read):
             continue
         if run.copied:
             why = "", " that copies another"

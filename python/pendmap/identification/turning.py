@@ -240,22 +240,60 @@ def _natural_frequency(time: Floats, theta: Floats) -> float | None:
     return float(np.median(2 * ellipk(np.sin(size / 2) ** 2) / np.diff(time[turns])))
 
 
+TURN_PARTS: Final = 12  # Parts of a turn whose mean speeds show the ripple by gravity
+FEWEST_TURNS: Final = 2  # Fewest turns in one sense from which starting values are estimated
+SLOW: Final = np.arange(4)  # Powers of the angle in the slow loss of energy over turns
+
+
+def rotating_start(time: Floats, theta: Floats) -> dict[str, float] | None:
+    """Return starting values from the longest rotation in one sense; None without its ripple.
+
+    ``v^2 = 2 w0^2 cos th + P(th)``, with a cubic ``P`` by the initial energy and its loss, is
+    fitted to mean speeds over parts of a turn.
+    """
+    steps = np.abs(np.diff(theta))
+    every = max(int(math.tau / TURN_PARTS / max(float(np.median(steps)), 1e-9)), 1)
+    time, theta = time[::every], theta[::every]
+    if time.size < _FEWEST:
+        return None
+    speed = np.diff(theta) / np.diff(time)
+    ends = np.flatnonzero(np.diff(np.sign(speed))) + 1
+    part = max(np.split(np.arange(speed.size), ends), key=len)
+    first, last, speed = theta[part], theta[part + 1], speed[part]
+    turned = abs(float(last[-1] - first[0]))
+    if turned < FEWEST_TURNS * math.tau or part.size <= 2 * SLOW.size or not speed.all():
+        return None
+    slow = ((first - first[0]) / turned)[:, None] ** SLOW
+    columns = np.column_stack([(np.sin(last) - np.sin(first)) / (last - first), slow])
+    fitted, *_ = np.linalg.lstsq(columns, speed**2)
+    left = float(np.sum((speed**2 - columns @ fitted) ** 2)) / (part.size - SLOW.size - 1)
+    error = math.sqrt(left * float(np.linalg.pinv(columns.T @ columns)[0, 0]))
+    if fitted[0] < _SURE * error:
+        return None
+    w0, energies = math.sqrt(fitted[0] / 2), slow[[0, -1]] @ fitted[1:] / 2
+    loss = max(float(energies[0] - energies[1]) / turned, 0.0)
+    viscous = 0.5 * loss / float(np.mean(np.abs(speed)))
+    return {"w0": w0, "c_over_m": max(viscous, 1e-4 * w0), "Tr": max(0.5 * loss, 1e-5 * w0**2)}
+
+
 def rough_start(time: Floats, theta: Floats, sigma: float) -> dict[str, float] | None:
     """Return starting values of ``w0``, ``c_over_m`` and ``Tr``; None with fewer than two swings.
 
     A half swing of amplitude ``A`` takes ``2 K(m) / w0`` with ``m = sin(A/2)**2``; from one to the
     next the energy ``w0**2 (1 - cos A)`` falls by ``c_over_m w0 8 (E(m) - (1 - m) K(m))`` (from the
     integral of the velocity over the angle) and ``2 A Tr``. Swings below four ``sigma`` are
-    excluded.
+    excluded. Rotations have those of :func:`rotating_start`.
     """
-    time, theta = swinging(time, theta)
+    whole, (time, theta) = (time, theta), swinging(time, theta)
     tail = theta[-max(len(theta) // 10, 1) :]
     # Only the mean of readings at rest is their centre.
     centre = float(np.mean(tail)) if np.ptp(tail) < QUIET * sigma else 0.0
     half = swings(time, theta - centre, least=4.0 * sigma)
     peaks = np.minimum(np.abs(half.peak), math.pi - 1e-3)
-    if len(peaks) < FEWEST_SWINGS:
-        return None
+    if len(peaks) < FEWEST_SWINGS or np.median(np.abs(half.peak)) > math.pi:
+        turning = rotating_start(*whole)
+        if turning is not None or len(peaks) < FEWEST_SWINGS:
+            return turning
     m = np.sin(np.minimum(peaks, 3.1) / 2) ** 2
     w0 = float(np.median(2 * ellipk(m) / np.diff(half.crossing)))
     if len(peaks) < FEWEST_SWINGS + 1:

@@ -31,7 +31,7 @@ class Segment:
     ----------
     what : str
         ``"held"`` before a release, ``"motion"``, ``"rest"`` after it, ``"handled"`` between two
-        releases.
+        releases, ``"driven"`` before a free motion, or braked after it.
     from_s, to_s : float
         First and last time, s.
     used : bool

@@ -20,12 +20,13 @@ from pendmap.signal.robust import between, normal_scale, stretches, widened
 
 if TYPE_CHECKING:
     from pendmap.records.work import Work
-    from pendmap.signal import Stretch
+    from pendmap.signal import Floats, Stretch
     from pendmap.tables.findings import Finding
 
 STILL_SPAN: Final = 8.0  # Range of readings below which there is no motion, over the noise
 FOLDED: Final = 0.97  # Reading over the gain, of an accelerometer, near a quarter turn
 NOISE_SPAN: Final = 0.1  # Range, rad, below which readings dominated by noise show no motion
+FAR_HOLD: Final = 0.05  # Distance of a hold from the middle of the swings, over their range
 MOST_LISTED: Final = 6  # Most releases whose times are listed in a message
 CERTAIN_OFFSET: Final = 4.0  # Standard errors above which an offset is reported
 
@@ -70,7 +71,7 @@ def free_motions(work: Work) -> Finding | None:
         return None
     _measure_noise(work)
     good = work.theta[work.trusted]
-    middle = 0.0 if work.angle_source is not None else middle_of(work.time[work.trusted], good)
+    middle = 0.0 if work.angle_source is not None else _middle(work, work.time[work.trusted], good)
     middle = float(np.median(good)) if middle is None else middle
     period = _period(work, middle)
     if period is None:
@@ -80,6 +81,17 @@ def free_motions(work: Work) -> Finding | None:
     parts = [(a, b) for a, b in between(_still(work, span), *span) if b - a > 5]
     work.parts = releases(work, parts)
     return None if work.angle_source is None else _below_a_quarter_turn(work)
+
+
+def _middle(work: Work, time: Floats, theta: Floats) -> float | None:
+    """Return the middle of the last swings, rad; before a hold at the end, where there is one."""
+    middle = middle_of(time, theta)
+    moving = np.flatnonzero(np.abs(theta - theta[-1]) > work.limit)
+    if middle is None or not moving.size:
+        return middle
+    before = middle_of(time[: moving[-1]], theta[: moving[-1]])
+    far = before is not None and abs(before - middle) > FAR_HOLD * float(np.ptp(theta))
+    return before if far else middle
 
 
 def _below_a_quarter_turn(work: Work) -> Finding | None:
@@ -193,7 +205,10 @@ def _between(work: Work, part: Stretch, *, first: bool) -> list[Segment]:
     reach = float(np.max(np.abs(work.theta[work.trusted] - work.middle)))
     far = abs(float(np.median(level)) - work.middle) > 0.1 * reach
     moved = float(np.ptp(level)) > 0.2 * reach
+    swings = np.min(level) < work.middle - 0.1 * reach and np.max(level) > work.middle + 0.1 * reach
+    cut = any(low < part[1] and high > part[0] for low, high in work.cut)
     what = "handled" if moved and not first else "held" if far or first else "rest"
+    what = "driven" if cut or (first and swings) else what
     return [_segment(work, what, part, used=False)]
 
 
@@ -208,6 +223,11 @@ def held_or_at_rest(work: Work) -> None:
     if first.what == "held":
         begin = moment(work.segments[1].from_s)
         work.note("held-start", span=(first.from_s, first.to_s), begin=begin)
+    if first.what == "driven" and len(work.segments) > 1:
+        begin = moment(work.segments[1].from_s)
+        work.note("driven-start", span=(first.from_s, first.to_s), begin=begin)
+    if last.what == "driven" and len(work.segments) > 1:
+        work.note("braked-end", span=(last.from_s, last.to_s), end=moment(last.from_s))
     if last.what == "rest" and len(work.segments) > 1:
         work.note("rest-tail", span=(last.from_s, last.to_s), begin=moment(last.from_s))
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.formatting import counted, listed
+from pendmap.records.driven import free_part, pushes
 from pendmap.signal.half_cycles import after_turns, swings
 from pendmap.signal.robust import stretches
 
@@ -31,7 +32,10 @@ RELEASES_APART: Final = 3.0  # Least time between releases, periods of small swi
 
 def releases(work: Work, parts: list[Stretch]) -> list[Stretch]:
     """Return the stretches of motions ``parts`` that begin with a release, in order."""
-    pieces = [piece for part in parts for piece in grown(work, part)]
+    pieces = parts
+    if not (math.isfinite(work.plan.from_s) and math.isfinite(work.plan.to_s)):  # not by hand
+        pieces = [free_part(work, piece) for part in parts for piece in grown(work, part)]
+        pieces = [part for piece in pieces for part in pushes(work, piece)]
     begin = held_short(work, pieces[0]) if pieces else None
     return pieces if begin is None else [(begin, pieces[0][1]), *pieces[1:]]
 

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.formatting import counted
+from pendmap.formatting import counted, moment
+from pendmap.records.by_hand import by_hand
 from pendmap.records.scale import GAIN_KNOWN, gain_of
 
 if TYPE_CHECKING:
@@ -20,23 +21,30 @@ if TYPE_CHECKING:
     from pendmap.tables.findings import Finding
 
 NYQUIST: Final = 2.0  # Fewest readings per period of the drive that resolve it
-LEAST_USED: Final = 0.1  # Share of readings in motion used by a fit below which a warning is given
-RESTING: Final = ("held", "rest")  # Segments without motion
+LEFT_OUT: Final = 0.1  # Share of readings in motion that a fit may leave out without a warning
+MOVING: Final = ("motion", "driven", "handled")  # Segments that may belong to a decay
+# Findings that leave readings in motion out
+REASONS: Final = ["acceleration-folded", "braked-end", "clipped", "driven-start", "frozen"]
+LEAVES_OUT: Final = [*REASONS, "missed-counts", "outliers", "several-releases", "trigger-release"]
 ON_STEPS: Final = 0.12  # Greatest rms distance from multiples of a step, in steps; chance: 0.29
 EDGE_SHARE: Final = 0.95  # Share of single-count steps above which a record is a log of edges
 FEWEST_EDGES: Final = 50  # Fewest readings from which edges are recognized
 
 
 def used_share(work: Work) -> Finding | None:
-    """Report a record of whose motion a fit would use a small part."""
-    moving = np.ones(work.time.size, bool)
+    """Report a record of which more than a tenth of the motion is not for fitting."""
+    moving = work.trusted.copy()
     for part in work.segments:
-        if part.what in RESTING:
-            moving &= (work.time < part.from_s) | (work.time > part.to_s)
-    used, whole = int(work.trusted.sum()), int((moving | work.trusted).sum())
-    if not 0 < used < LEAST_USED * whole:
+        if part.what in MOVING:
+            moving |= (work.time >= part.from_s) & (work.time <= part.to_s)
+    used, whole = int(work.trusted.sum()), int(moving.sum())
+    if not 0 < used < (1 - LEFT_OUT) * whole:
         return None
-    return work.finding("few-used", used=used, readings=counted(whole, "reading"))
+    at = work.time[moving]
+    command = by_hand(work.where, **{"from": moment(at[0]), "to": moment(at[-1])})
+    why = "; ".join(finding.text for finding in work.findings if finding.what in LEAVES_OUT)
+    readings = counted(whole, "reading")
+    return work.finding("few-used", used=used, readings=readings, why=why, command=command)
 
 
 def drive(work: Work) -> Finding | None:
@@ -120,3 +128,4 @@ def edges(work: Work) -> None:
     if np.count_nonzero(way == 0) <= np.count_nonzero(way[1:] * way[:-1] < 0):
         work.theta -= 0.5 * work.estimated_step * np.append(way[0], way)
         work.trusted[0] = False  # it may be the initial count, not an edge
+        work.trusted[1:] &= way != 0  # a line between two edges or at rest

@@ -114,7 +114,8 @@ def _abrupt(work: Work, low: int, high: int) -> bool:
     ]
     missed = min(slopes, default=-math.inf) * float(work.time[high - 1] - work.time[low]) / 4
     noise = float(np.median(np.abs(np.diff(work.theta, 2)))) if work.theta.size > 2 else 0.0
-    return missed > 2 * work.count + 3 * min(noise, 0.01)
+    # The extreme of a parabola is half of this above its ends: a count, and more by friction.
+    return missed > 4 * work.count + 3 * min(noise, 0.01)
 
 
 def measured(time: Floats, theta: Floats) -> tuple[str, int, Indices] | None:

@@ -22,7 +22,13 @@ if TYPE_CHECKING:
 # Findings of a wrong unit or scale, which makes results wrong unless corrected
 UNIT_FINDINGS: Final = frozenset(("angle-scale", "angle-unit", "pivot-unit", "time-unit"))
 # Findings that are reported before any result
-DOUBTFUL: Final = UNIT_FINDINGS | {"few-used", "lab-time-missing", "motor-column", "rigs-differ"}
+DOUBTFUL: Final = UNIT_FINDINGS | {
+    "few-used",
+    "lab-time-missing",
+    "motor-column",
+    "rigs-differ",
+    "upright-left-out",
+}
 
 
 def as_json(experiment: Experiment) -> dict[str, Any]:
@@ -71,11 +77,11 @@ def _run(run: Run) -> dict[str, Any]:
 
 def as_text(experiment: Experiment) -> str:
     """Return the content of an experiment as text."""
-    lines = []
+    lines = [*doubt_lines(experiment, *experiment.runs)]
     if experiment.known:
         known = ", ".join(f"{name} {value:g}" for name, value in experiment.known.items())
         lines.append(f"rig       {known}")
-    lines += [_line(finding) for finding in experiment.findings]
+    lines += [_line(finding) for finding in experiment.findings if not _doubted(finding)]
     for run in experiment.runs:
         if lines:
             lines.append("")
@@ -117,7 +123,8 @@ def _lines(run: Run) -> Iterator[str]:
     many = counted(len(run.findings), "finding")
     yield f"  {many}, {mended} of them mended" if run.findings else "  no findings"
     for finding in run.findings:
-        yield f"  {_line(finding)}"
+        if not _doubted(finding):
+            yield f"  {_line(finding)}"
 
 
 def _line(finding: Finding) -> str:
@@ -139,9 +146,10 @@ def doubt_lines(experiment: Experiment, *runs: Run) -> Iterator[str]:
 
 
 def doubt_keys(experiment: Experiment, *runs: Run) -> set[str]:
-    """Return the keys of uncorrected doubtful findings, without those of single effects."""
+    """Return the keys of uncorrected doubtful findings of the readings that are used."""
     keys = {finding.what for _, finding in experiment.findings_of(runs) if _doubted(finding)}
-    return keys - {"angle-scale", "lab-time-missing"}  # a gain or a drift, for example
+    # An effect can cause the first two, the others are of readings that are not used.
+    return keys - {"angle-scale", "lab-time-missing", "few-used", "upright-left-out"}
 
 
 def finding_lines(experiment: Experiment, *runs: Run, changes: bool = False) -> Iterator[str]:

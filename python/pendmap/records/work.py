@@ -67,6 +67,7 @@ class Work:
     jumps: list[Jump] = dataclasses.field(default_factory=list)  # of the reading, not corrected
     bridged: Floats = dataclasses.field(default_factory=lambda: np.empty(0))  # without outliers
     parts: list[Stretch] = dataclasses.field(default_factory=list)  # free motions
+    cut: list[Stretch] = dataclasses.field(default_factory=list)  # driven or braked
     releases: list[Stretch] = dataclasses.field(default_factory=list)  # parts that are used
     edge: str | None = None  # edge of the trigger that is used
     edges: bool = False  # each reading is an edge of an encoder

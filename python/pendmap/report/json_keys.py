@@ -74,7 +74,7 @@ _CONTENT: Final = {
     "noise.law.stderr": ("s", "standard error of tau"),
     "noise.law.fastest": ("rad/s", "largest phase velocity of the motion"),
     "noise.law.grows_with": ("", "what the noise grows with"),
-    "segments[].what": ("", "state of the pendulum: held, motion, rest or handled"),
+    "segments[].what": ("", "state of the pendulum: held, driven, motion, rest or handled"),
     "segments[].used": (FLAG, "whether its samples are for fitting"),
     **_at("segments[]", _SPAN),
 }

@@ -82,13 +82,14 @@ def calm_responses(
 ) -> list[Response]:
     """Return the responses of windows in which deviations of the initial state grow little.
 
-    In other windows the linear response is inaccurate. ``damping`` is ``c/m``, 1/s.
+    In other windows the linear response is inaccurate; readings of rates are not used. ``damping``
+    is ``c/m``, 1/s.
     """
     every, growth = [], []
     for window in windows:
         run = runs[window.run]
         weighted = np.flatnonzero(window.weight > 0)
-        if weighted.size < KEPT:
+        if weighted.size < KEPT or run.rod_sensor is not None:
             continue
         time = run.time[window.first + weighted]
         states, residual = window.states[weighted], window.residual[weighted]

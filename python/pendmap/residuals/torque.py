@@ -220,14 +220,19 @@ def _binned(place: dict[str, Floats], edges: dict[str, Floats]) -> Floats:
 def responses(run: FitRun, window: WindowSlopes, torques: Floats) -> Floats:
     """Return the response of a window's readings to torques, over standard errors, shape (n, k).
 
-    ``torques`` are per moment of inertia at the window's samples, rad/s^2, shape (n, k).
+    ``torques`` are per moment of inertia at the window's samples, rad/s^2, shape (n, k). The
+    readings of a gyroscope are the derivative of ``e``.
     """
     part = slice(window.first, window.first + len(window.residual))
     time = run.time[part]
     if time.size < 3:  # noqa: PLR2004 (no slope)
         return np.zeros(torques.shape)
     weight = window.weight
-    a, b = (window.states / np.where(weight > 0, weight, 1.0)[:, None]).T
+    read = (window.states / np.where(weight > 0, weight, 1.0)[:, None]).T
+    a, b = read
+    if run.rod_sensor is not None:
+        rises = 0.5 * (read[:, 1:] + read[:, :-1]) * np.diff(time) / run.rod_sensor.rate
+        a, b = np.cumsum(np.column_stack([[1.0, 0.0], rises]), axis=1)
     wronskian = a * np.gradient(b, time) - np.gradient(a, time) * b
     sound = np.abs(wronskian) > LOST * float(np.max(np.abs(wronskian)))
     inverse = np.where(sound, 1.0 / np.where(sound, wronskian, 1.0), 0.0)
@@ -238,7 +243,7 @@ def responses(run: FitRun, window: WindowSlopes, torques: Floats) -> Floats:
         summed = np.cumsum(steps * rate, axis=0)
         return np.asarray(summed - 0.5 * steps * rate, np.float64)
 
-    response = b[:, None] * integral(a) - a[:, None] * integral(b)
+    response = read[1][:, None] * integral(a) - read[0][:, None] * integral(b)
     return np.asarray(response * weight[:, None], np.float64)
 
 

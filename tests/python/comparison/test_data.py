@@ -114,3 +114,25 @@ def test_a_fit_to_blocks_equals_one_to_readings() -> None:
     for name, estimate in one.estimates.items():
         assert other[name] == pytest.approx(estimate.value, abs=0.2 * estimate.stderr)
         assert other.estimates[name].stderr == pytest.approx(estimate.stderr, rel=0.02)
+
+
+@pytest.mark.parametrize("turn", [1000, 4000])
+def test_counts_of_dense_readings_are_averaged_with_their_errors(turn: int) -> None:
+    count = 2 * np.pi / turn
+    readings = count * np.round(DENSE_ANGLE / count)
+    run = average_blocks(FitRun(DENSE, readings, count / np.sqrt(12), count=count))
+    assert run.count is None
+    assert run.time.size < DENSE.size / 10
+    scatter = ((run.theta - CubicSpline(DENSE, DENSE_ANGLE)(run.time)) / run.sigma)[3:-3]
+    assert 0.3 < np.std(scatter) < 1.05
+    start = Rig(w0=8.01, c_over_m=0.04, Tr=0.04)
+    fit = fit_runs([run], start, profiled=())
+    for name, true in (("w0", 8.0), ("c_over_m", 0.05), ("Tr", 0.05)):
+        assert abs(fit[name] - true) < 4 * (fit.estimates[name].stderr or 0)
+
+
+def test_of_too_many_readings_every_second_is_fitted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pendmap.comparison.data.MOST", 2000)
+    data = split("f0", "f1")
+    assert [run.time.size for run in data.fitted] == [750, 750]
+    assert data.fitted[0].sigma == pytest.approx(1e-3, rel=0.1)

@@ -244,6 +244,6 @@ def test_reports_and_comparisons_are_in_radians(tmp_path: Path, sensor: str) -> 
     for w0, low, high in ((6.2, 0.95, 1.05), (6.21, 3.0, math.inf)):
         other = pendmap.Rig(**TRUTH | {"w0": w0})
         assert low * level < compare(other, run).runs[0].rms < high * level
-    refused = {"gyroscope": "an integrated velocity", "accelerometer": "computed from an acceler"}
-    with pytest.raises(InputError, match=f"its angle is {refused[sensor]}"):
-        split_records(Experiment(tmp_path, (run,)))
+    if sensor == "accelerometer":
+        with pytest.raises(InputError, match="its angle is computed from an acceler"):
+            split_records(Experiment(tmp_path, (run,)))

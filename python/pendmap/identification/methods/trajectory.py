@@ -14,18 +14,18 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.errors import FitDiverged, InputError
-from pendmap.formatting import Estimate, counted
+from pendmap.formatting import Estimate, counted, moment
 from pendmap.identification.fit import fit_runs
 from pendmap.identification.methods.base import Identification
 from pendmap.identification.parameters import OFFSET, OPPOSING, SENSOR, opposing
 from pendmap.identification.readings import as_fit_run, reading_of_run
 from pendmap.identification.sensitivity import upper_limit
-from pendmap.identification.turning import TooShortError, rough_start, swinging
+from pendmap.identification.turning import TooShortError, rotating_start, rough_start, swinging
 from pendmap.model import Rig
 from pendmap.model.effects import Effect
 from pendmap.signal.half_cycles import swings
 from pendmap.signal.robust import span
-from pendmap.tables.findings import texts
+from pendmap.tables.findings import finding_of, texts
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
@@ -34,6 +34,12 @@ if TYPE_CHECKING:
     from pendmap.identification.readings import Reading
     from pendmap.identification.runs import FitRun
     from pendmap.records import Run
+
+NEAR_UPRIGHT: Final = 0.3
+"""Angle from upright, rad, within which a fit that does not converge does not follow a run."""
+
+MOST_LEFT: Final = 0.5
+"""Least share of a run's readings that is fitted from where it leaves the upright position."""
 
 LACKING: Final = 4.0
 """Widening above which readings have equal weights: else the slowest alone would dominate."""
@@ -158,7 +164,7 @@ def _start_of(start: Rig | Mapping[str, float] | None, run: FitRun, sigma: float
         return start
     time, theta = run.time[run.counted], run.angle[run.counted]
     peaks = np.abs(swings(*swinging(time, theta)).peak)
-    if peaks.size and np.median(peaks) > math.pi:
+    if peaks.size and np.median(peaks) > math.pi and rotating_start(time, theta) is None:
         text, _ = texts()["angle-unit.wrong"]
         raise InputError(f"{run.name}: {text.format(largest=peaks.max())}")
     rough = rough_start(time, theta, sigma) or {}
@@ -208,8 +214,39 @@ def fit_together(
 ) -> JointFit:
     """Fit natural frequency, damping, the sensor's zero error and effects to one or more runs.
 
-    The choices are those of :func:`fit_from_start`.
+    The choices are those of :func:`fit_from_start`. Where the search does not converge, runs are
+    used from where they leave the upright position, near which every error grows.
     """
+    joint = fit_trusted(runs, start, held, effects)
+    later = [_from_upright(run) for run in runs]
+    if joint.fit.converged or all(run is cut for run, cut in zip(runs, later, strict=True)):
+        return joint
+    again = fit_trusted(later, start, held, effects)
+    return again if again.fit.converged else joint
+
+
+def _from_upright(run: Run) -> Run:
+    """Return a run that is used from where it has last left the upright position."""
+    near = np.cos(run.theta) < -math.cos(NEAR_UPRIGHT)
+    after = np.arange(run.time.size) > np.max(np.flatnonzero(near), initial=-1)
+    left = np.count_nonzero(run.trusted & after)
+    if (
+        run.rod_sensor is not None
+        or not np.count_nonzero(run.trusted) > left > MOST_LEFT * after.size
+    ):
+        return run
+    begin = moment(run.time[int(np.argmax(after))])
+    finding = finding_of("upright-left-out", where=run.name, begin=begin)
+    return dataclasses.replace(run, trusted=run.trusted & after, findings=(*run.findings, finding))
+
+
+def fit_trusted(
+    runs: Sequence[Run],
+    start: Rig | Mapping[str, float] | None,
+    held: Collection[str],
+    effects: Sequence[Effect | str],
+) -> JointFit:
+    """Return the fit to all trusted readings of runs."""
     readings = [reading_of_run(run) for run in runs]
     given = [as_fit_run(run, reading) for run, reading in zip(runs, readings, strict=True)]
     fit, worth = fit_from_start(given, readings, start=start, held=held, effects=effects)
