@@ -137,13 +137,12 @@ def likely(table: Table, places: Mapping[str, int], *, timed: bool) -> dict[str,
     ordered = [k for k in free if in_order(columns[k]) or rises(columns[k])]
     if timed and "time" not in places and ordered:
         taken["time"] = next((k for k in ordered if rises(columns[k])), ordered[0])
-    swinging = _swinging(table, [k for k in free if k not in ordered])
+    moving = [k for k in free if k not in ordered and changes(columns[k])]
+    swinging = _swinging(table, moving)
     if swinging and not any(channel in places for channel in ANGLE_CHANNELS):
-        first, *others = sorted(swinging)
-        if others and on_circle(columns[first], columns[others[0]]):
-            taken |= {"pixel_x": first, "pixel_y": others[0]}
-        else:
-            taken["angle"] = swinging[0]
+        x = min(swinging)
+        y = next((k for k in moving if k != x and on_circle(columns[x], columns[k])), None)
+        taken |= {"angle": swinging[0]} if y is None else {"pixel_x": x, "pixel_y": y}
     return taken
 
 
