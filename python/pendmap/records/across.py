@@ -35,6 +35,7 @@ LEAST_SHARE: Final = 0.1  # Least share of the shorter run in a duplicate
 LEAST_LEVELS: Final = 20  # Least span of a duplicate, sensor steps: smaller ones agree by chance
 AGREEING: Final = 0.99  # Least share of readings that agree within half a step; 1 % may be edited
 ROUNDING: Final = 1e-6  # Rounding error of a conversion between units, over the range
+OFF_STEP: Final = 1e-2  # Tolerance, in steps, for differences that are multiples of a step
 
 
 def checked_together(runs: Sequence[Run]) -> tuple[tuple[Run, ...], tuple[Finding, ...]]:
@@ -145,15 +146,28 @@ def without_duplicates(runs: Sequence[Run]) -> list[Run]:
     order = sorted(range(len(runs)), key=lambda k: (runs[k].hold_out, -motions[k].size, k))
     for place, k in enumerate(order):
         for other in order[:place]:
-            step = max(runs[other].count_rad, runs[k].count_rad)
-            shared = _shared(motions[other], motions[k], step)
+            shared = _shared(motions[other], motions[k])
             if shared is not None and made[k].moves:
                 first, last = shared
                 made[k] = _without(made[k], runs[other], parts[k].start + first, last - first)
     return made
 
 
-def _shared(one: Floats, other: Floats, step: float) -> tuple[int, int] | None:
+def _digit(theta: Floats) -> float:
+    """Return the resolution of written or counted readings; 0 if none is found."""
+    apart = np.diff(np.unique(np.round(theta, 12)))
+    if not apart.size:
+        return 0.0
+    step = float(apart.min())
+    # Written digits round the multiples of a count; averaging many steps reduces this error.
+    near = apart[apart < 1.5 * step]
+    step = float(near.mean())
+    multiples = apart / step
+    away = np.abs(multiples - np.round(multiples))
+    return step if float(np.quantile(away, 0.9)) < OFF_STEP * max(multiples.mean(), 1.0) else 0.0
+
+
+def _shared(one: Floats, other: Floats) -> tuple[int, int] | None:
     """Return first and last (exclusive) duplicated reading of ``other``; None without any."""
     from scipy.signal import correlate, correlation_lags
 
@@ -173,6 +187,7 @@ def _shared(one: Floats, other: Floats, step: float) -> tuple[int, int] | None:
     first, last = max(-lag, 0), min(other.size, one.size - lag)
     a, b = a[first + lag : last + lag], b[first:last]
     away = np.abs(b - a - np.median(b - a))
+    step = max(_digit(one), _digit(other))
     allowed = (0.5 + a.size**-0.5) * step + ROUNDING * float(np.ptp(b))
     alike = np.ptp(b) > LEAST_LEVELS * step and np.mean(away <= allowed) >= AGREEING
     return (first, last) if alike else None
