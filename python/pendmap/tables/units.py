@@ -88,8 +88,8 @@ class Channel:
         spelled = spelling(unit)
         if spelled not in self.units:
             raise InputError(
-                f"{where}: unit must be one of {', '.join(self.units)}, or have a scale beside it,"
-                f" {self.unit} per unit, in [columns] of experiment.toml, got {unit!r}"
+                f"{where}: unit must be one of {', '.join(self.units)}, or a scale must be given,"
+                f" {self.unit} per unit{' (angle_scale)' * (self.unit == 'rad')}, got {unit!r}"
             )
         return self.units[spelled]
 
