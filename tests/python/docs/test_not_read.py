@@ -7,7 +7,6 @@ import json
 import math
 import re
 import shlex
-from contextvars import Context
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -18,8 +17,7 @@ import pendmap
 from containers import THETA as SWING
 from containers import TIME as INSIDE
 from containers import archive, matlab, open_document, tracker, workbook
-from pendmap.records.by_hand import by_hand
-from recorded import W0, found, motion
+from recorded import W0, found, motion, words
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -233,7 +231,7 @@ def test_a_file_of_the_page_is_read_by_its_command(
 ) -> None:
     path = tmp_path / kind.name
     path.write_text(kind.content, encoding="utf-8")
-    command = Context().run(by_hand, kind.name, **kind.options)
+    command = shlex.join(["pendmap", "look", kind.name, *words(kind.options)])
     assert f"`{command}`" in TEXT
     shown = [f"```text\n{head(kind.content, lines)}\n```" for lines in range(3, 7)]
     assert kind.content.startswith(TIMES_ARE_RIGHT) or any(block in TEXT for block in shown)
