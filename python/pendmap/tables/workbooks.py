@@ -86,7 +86,7 @@ def _excel(data: bytes, where: str) -> Mapping[str, list[list[object]]]:
 
 def _rows(rows: Iterable[Iterable[object]], where: str) -> list[list[object]]:
     """Return the rows of a sheet up to their last cells; InputError for too many cells."""
-    kept, count = list[list[object]](), 0
+    filled, count = list[list[object]](), 0
     for row in rows:
         cells, missing = list[object](), 0
         for cell in row:
@@ -96,10 +96,10 @@ def _rows(rows: Iterable[Iterable[object]], where: str) -> list[list[object]]:
                 _refuse_many(count, where)
                 cells += [None] * (missing - 1) + [cell]
                 missing = 0
-        kept.append(cells)
+        filled.append(cells)
         count += 1
         _refuse_many(count, where)
-    return kept
+    return filled
 
 
 def _refuse_many(count: int, where: str) -> None:
