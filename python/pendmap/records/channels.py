@@ -56,10 +56,13 @@ def channels_of(  # noqa: C901 (a step each)
         # Without a name it gives unit, scale or zero of a column that is found by its usual names.
         if column.name is not None or name in table.names:
             places[channel] = _place(name, table, f"{where}: {channel}")
+    # An empty column gives way to another.
+    columns = zip(table.names, table.values.T, strict=True)
+    filled = [name if np.isfinite(values).any() else "" for name, values in columns]
     for channel, kind in CHANNELS.items():
-        if channel in places or kind.default not in table.names:
+        if channel in places or kind.default not in filled:
             continue
-        place = table.names.index(kind.default)
+        place = filled.index(kind.default)
         # [columns] may say that theta_rad holds turning points: then it holds no angles.
         if channel != "angle" or place != places.get("peaks"):
             places[channel] = place

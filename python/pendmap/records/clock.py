@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-import operator
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -15,14 +14,13 @@ from pendmap.formatting import Estimate, counted, estimate_text, listed, moment
 from pendmap.records.by_hand import by_hand
 from pendmap.records.noise import OUTLIER, raise_degree
 from pendmap.records.resolution import FEWEST_EDGES, logs_edges, spread_stamps
-from pendmap.records.slips import slips_of
 from pendmap.records.work import FEWEST_SAMPLES
-from pendmap.signal.local_polynomial import local_fit
-from pendmap.signal.robust import broad_scale, intervals_of
+from pendmap.signal.local_polynomial import POINTS, local_fit
+from pendmap.signal.robust import broad_scale, intervals_of, widened
 
 if TYPE_CHECKING:
     from pendmap.records.work import Work
-    from pendmap.signal import Floats, Indices, Stretch
+    from pendmap.signal import Floats, Indices, Mask, Stretch
     from pendmap.signal.local_polynomial import LocalFit
     from pendmap.tables.findings import Finding
 
@@ -33,12 +31,12 @@ STOPPED_READINGS: Final = 50  # Most readings with one stamp (or ten times the u
 COARSE_STAMPS: Final = 0.2  # Least share of repeated stamps of a coarse clock
 SPACING: Final = frozenset(("time-gap", "time-jitter", "time-uneven"))  # Findings about intervals
 AROUND: Final = 101  # Readings around one whose second differences are usual there
-SMOOTHER: Final = 0.98  # Residual, over that with lost readings, of a record without
+SMOOTHER: Final = 16.0  # Decrease of chi squared of a motion that is clearly smoother
 CERTAIN_SHARE: Final = 3.0  # Standard errors by which a motion follows even times or its stamps
+BLOCKS: Final = 20  # Blocks of stamps whose means are independent
 STAMPS: Final = 16  # Stamps on each side of an interval whose means show a lost reading
 PLACINGS: Final = 8  # Searches for lost readings; each may reveal one next to another
 LATE: Final = 0.6  # Intervals by which stamps that follow a lost reading are late on average
-EXACT: Final = 1e-6  # Share of a tick below which a distance is rounding
 
 
 def missing(work: Work) -> Finding | None:
@@ -109,153 +107,66 @@ def longest_between(edges: list[int], size: int) -> Stretch:
 
 
 def coarse(work: Work) -> Finding | None:
-    """Space readings evenly if stamps are in coarse ticks: over the record, else over a tick."""
+    """Space readings evenly if the motion follows even times; else spread equal stamps."""
     steps = np.diff(work.time)
     if not np.all(steps >= 0) or not np.any(steps > 0):
         return None
-    same = float(np.mean(steps == 0))
+    same, spread = float(np.mean(steps == 0)), spread_stamps(work.time)
     if logs_edges(work.theta):
-        work.time = spread_stamps(work.time)
+        work.time = spread
         return work.finding("time-coarse.edges", percent=100 * same) if same else None
-    rise = steps - steps.min(initial=0.0 if same else math.inf)
-    usual = float(np.median(steps[steps > 0]))
-    rise = rise[rise > REPORTED_JITTER * usual]
     channels = np.stack([work.theta, *work.extra.values(), *work.pivot.values()])
     again = np.all(np.diff(channels, axis=1)[:, steps == 0] == 0, axis=0)  # samples and stamps
-    if not rise.size or (same and np.mean(again) > 0.9):
+    if work.time.size < FEWEST_EDGES or (same and np.mean(again) > 0.9):
         return None
-    ticks = _ticks(work.time, rise, steps, channels, same=same)
-    return _scattered(work, channels) if ticks is None else _in_ticks(work, channels, *ticks)
-
-
-def _in_ticks(work: Work, channels: Floats, tick: float, even: _Even) -> Finding | None:
-    """Space the readings of stamps in exact ticks evenly, if the motion does not follow them."""
-    missing, few = "", ""
+    in_ticks = same >= COARSE_STAMPS
     place = np.arange(work.time.size)
-    slips = slips_of(even.times, work.theta, fewest=1)
-    if slips is not None:  # readings are lost where the others jump, if the stamps allow it
-        lost = np.round((slips.time - even.times) / even.interval).astype(np.intp)
-        if (whole := _even(work.time, place + lost, tick)).missed <= max(even.missed, 0.0):
-            even = whole
-            missing = f", {counted(int(lost[-1]), 'reading')} lost where the others jump"
-    share, error, _ = _followed(work.time, even, channels)
-    if share - CERTAIN_SHARE * error > 0.5:
+    places = _with_lost(spread, place)
+    near = widened(np.diff(places, prepend=-1) != 1, POINTS // 2)
+    lines = [_line(spread, some) for some in (places, place)]
+    tries = [_followed(line, work.time, channels, near) for line in lines]
+    # Late stamps show lost readings, unless the motion is clearly smoother without them.
+    which = int(tries[1].near < tries[0].near - SMOOTHER)
+    even, share = lines[which], tries[which]
+    wander = np.ptp(np.convolve(spread - even.times, np.ones(STAMPS) / STAMPS, "valid"))
+    steady = wander < LATE * even.interval * (2 if in_ticks or which else 1)
+    margin = CERTAIN_SHARE * share.error
+    if share.share + (-margin if in_ticks else margin) > 0.5:
         return None
-    work.clock_stderr = even.stderr / even.interval
-    if even.missed <= even.interval:
-        rate = estimate_text(Estimate(1 / even.interval, work.clock_stderr / even.interval))
-        work.time = even.times
-        return work.finding("time-coarse.even", tick=tick, lost=missing, rate=rate)
-    if slips is None and (scattered := _scattered(work, channels)) is not None:
-        return scattered
-    _, number = np.unique(work.time, return_counts=True)
-    out = np.repeat(number < np.median(number) - 1, number)
-    work.time = spread_stamps(work.time)
-    work.keep(~out)
-    if out.any():
-        few = f"; {counted(int(out.sum()), 'reading')} in ticks that lack readings left out"
-    return work.finding("time-coarse.tick", tick=tick, lost=missing, few=few)
-
-
-def _ticks(
-    time: Floats, rise: Floats, steps: Floats, channels: Floats, *, same: float
-) -> tuple[float, _Even] | None:
-    """Return the tick of coarse stamps and their even times; None if stamps are not coarse."""
-    # The least changes of the steps are ticks, or the rounding of the digits of longer ones.
-    place, least = np.arange(time.size), float(rise.min())
-    usual = float(np.median(steps[steps > 0]))
-    rounded = not np.any((rise > 2 * least) & (rise <= 4 * least))
-    for some in (rise, rise[rise > 4 * least] if rounded else rise[:0]):
-        if not some.size:
-            break
-        near = some[some < 1.5 * some.min()]
-        spread = 2 * least if some is not rise else near.max() - near.min()
-        tick = float(near.max() + spread) + 4 * float(np.spacing(np.max(np.abs(time))))
-        even = _even(time, place, tick)
-        if same >= COARSE_STAMPS:
-            return tick, even
-        other = np.flatnonzero(np.abs(steps - np.median(steps)) > 0.5 * tick) + 1
-        smooth = any(_smoother(values, other) for values in channels)
-        rival = even.missed > EXACT * tick or tick > 1.5 * usual
-        if not (rival or steps.size < FEWEST_EDGES or not smooth):
-            return tick, even
-    return None
+    width = float(np.ptp(work.time - even.times))
+    if not steady or width < REPORTED_JITTER * even.interval:
+        if in_ticks:
+            work.time = spread
+        return work.finding("time-coarse.tick", percent=100 * same) if in_ticks else None
+    lost = 0 if which else int(places[-1] - place[-1])
+    work.time, work.clock_stderr = even.times, even.stderr / even.interval
+    rate = estimate_text(Estimate(1 / even.interval, work.clock_stderr / even.interval))
+    missing = f", {counted(lost, 'reading')} lost" if lost else ""
+    return work.finding("time-coarse", width=width, lost=missing, rate=rate)
 
 
 @dataclasses.dataclass(frozen=True)
-class _Even:
-    """Even times, each in the tick of its stamp."""
+class _Line:
+    """Even times nearest to stamps."""
 
     interval: float  # s
     stderr: float  # standard error of the interval, s
     times: Floats  # s
-    missed: float  # sum of the least distances of an early and a late reading from its tick, s
 
 
-def _even(time: Floats, place: Indices, tick: float) -> _Even:
-    """Return the mean of all even times for which each reading is in the tick after its stamp.
-
-    A reading that is in its tick for no interval may miss it by half an interval more than the
-    least distance. ``stamp_k <= t_0 + k dt < stamp_k + tick`` is a convex region of ``(t_0, dt)``,
-    in which all points are equally likely; only corners of the stamps' convex hull bound it.
-    """
-    from scipy.spatial import ConvexHull
-
-    usual = float((time[-1] - time[0]) / place[-1])
-    off = time - time[0] - usual * place
-    scaled = np.column_stack((place / place[-1], off / tick))
-    corners = ConvexHull(scaled, qhull_options="QbB").vertices
-    x, y = place[corners], off[corners]
-    sides = (np.roll(y, -1) - y) / (np.roll(x, -1) - x)
-    missed = float(np.min(np.ptp(y - np.outer(sides, x), axis=1))) - tick
-    wide = tick if missed < -EXACT * tick else tick + max(missed, 0.0) + usual
-    after = x[:, None] > x
-    run, up = (x[:, None] - x)[after], (y[:, None] - y)[after]
-    slopes = np.linspace(np.max((up - wide) / run), np.min((up + wide) / run), 400)
-    room = np.maximum(wide - np.ptp(y - np.outer(slopes, x), axis=1), 1e-9 * tick)
-    slope = float(np.average(slopes, weights=room))
-    spread = math.sqrt(float(np.average((slopes - slope) ** 2, weights=room)))
-    left = y - slope * x
-    times = time[0] + (left.max() + left.min() + tick) / 2 + (usual + slope) * place
-    return _Even(usual + slope, spread, times, missed)
-
-
-def _scattered(work: Work, channels: Floats) -> Finding | None:
-    """Space readings evenly if the motion shows that they are, and their stamps scatter."""
-    if work.time.size < FEWEST_EDGES:
-        return None
-    place = np.arange(work.time.size, dtype=float)
-    lines = [_line(work.time, places) for places in (_with_lost(work.time, place), place)]
-    tries = [_followed(work.time, line, channels) for line in lines]
-    # Stamps show lost readings, unless the motion is clearly smoother without them.
-    which = int(tries[1][2] < SMOOTHER * tries[0][2])
-    even, (share, error, _) = lines[which], tries[which]
-    off = work.time - even.times
-    runs = np.convolve(off, np.ones(STAMPS) / STAMPS, "valid")
-    steady = np.ptp(runs) < LATE * even.interval and share + CERTAIN_SHARE * error < 0.5
-    if not steady or slips_of(even.times, work.theta, fewest=1):
-        return None
-    width, lost = even.missed, round((even.times[-1] - even.times[0]) / even.interval - place[-1])
-    work.time, work.clock_stderr = even.times, even.stderr / even.interval
-    rate = estimate_text(Estimate(1 / even.interval, work.clock_stderr / even.interval))
-    missing = f", {counted(lost, 'reading')} lost" if lost else ""
-    return work.finding("time-coarse.scatter", width=width, lost=missing, rate=rate)
-
-
-def _line(time: Floats, place: Floats) -> _Even:
-    """Return the even times nearest to stamps; ``missed`` is the range of the differences."""
+def _line(time: Floats, place: Indices) -> _Line:
+    """Return the even times nearest to stamps of readings at some places."""
     far = place - place.mean()
     interval = float(far @ time) / float(far @ far)
     times = time.mean() + interval * far
     # Stamps of one tick are alike: the error is that of independent means of blocks.
-    block = math.isqrt(time.size)
-    means = (time - times)[: block * block].reshape(block, block).mean(axis=1)
+    block = time.size // BLOCKS
+    means = (time - times)[: block * BLOCKS].reshape(BLOCKS, block).mean(axis=1)
     spread = max(float(np.std(time - times)), math.sqrt(block) * float(np.std(means)))
-    stderr = spread / math.sqrt(float(far @ far))
-    return _Even(interval, stderr, times, float(np.ptp(time - times)))
+    return _Line(interval, spread / math.sqrt(float(far @ far)), times)
 
 
-def _with_lost(time: Floats, place: Floats) -> Floats:
+def _with_lost(time: Floats, place: Indices) -> Indices:
     """Return the places of readings, of which some are lost where all later stamps are late."""
     from scipy.ndimage import maximum_filter1d
 
@@ -263,7 +174,7 @@ def _with_lost(time: Floats, place: Floats) -> Floats:
     edge = np.arange(3, time.size - 2)
     low, high = np.maximum(edge - beside, 0), np.minimum(edge + beside, time.size)
 
-    def steps(values: Floats) -> Floats:
+    def steps(values: Floats | Indices) -> Floats:
         """Return the means after each interval less the means before."""
         sums = np.concatenate(([0.0], np.cumsum(values - values[0])))
         before = (sums[edge] - sums[low]) / (edge - low)
@@ -278,44 +189,44 @@ def _with_lost(time: Floats, place: Floats) -> Floats:
         size = np.abs(late)
         at = np.flatnonzero((size > LATE) & (size >= maximum_filter1d(size, 2 * beside + 1)))
         for k, lost in zip(edge[at], late[at], strict=True):
-            places[k:] += round(lost) if abs(lost) < RESTART else lost
-    line = _line(time, places)
-    nearest = np.round((time - line.times[0]) / line.interval)
-    for better in (nearest, places):
-        if np.all(np.diff(better) > 0.5) and _line(time, better).missed <= line.missed:
-            return better
-    return place
+            places[k:] += round(lost)
+    return places if np.all(np.diff(places) > 0) else place
 
 
-def _followed(time: Floats, even: _Even, channels: Floats) -> tuple[float, float, float]:
-    """Return what :func:`_share` does, of the channel that determines the share best."""
-    off = time - even.times
-    return min((_share(even.times, off, v) for v in channels), key=operator.itemgetter(1))
+@dataclasses.dataclass(frozen=True)
+class _Share:
+    """Share of the scatter of stamps about even times that a motion follows."""
+
+    share: float  # 1: stamps are the instants of the readings; 0: the even times are
+    error: float  # standard error of the share
+    near: float  # chi squared of the readings near lost ones
 
 
-def _share(times: Floats, off: Floats, values: Floats) -> tuple[float, float, float]:
-    """Return the share of the stamps' scatter that a motion follows, its error, and the residual.
+def _followed(even: _Line, stamps: Floats, channels: Floats, near: Mask) -> _Share:
+    """Return the share of the channel that determines it best."""
+    return min((_share(even, stamps, v, near) for v in channels), key=lambda share: share.error)
 
-    About even times a reading is ``s(t) + share v off``: the share is 1 if the stamps are the
-    instants of the readings, and 0 if the even times are.
-    """
+
+def _share(even: _Line, stamps: Floats, values: Floats, near: Mask) -> _Share:
+    """Return the share of the scatter that a channel follows: ``s(t) + share v (stamp - t)``."""
 
     def fitted(degree: int = 4, points: int = 9) -> LocalFit:
-        fit = local_fit(times, values, degree=degree, points=points)
+        fit = local_fit(even.times, values, degree=degree, points=points)
         size = np.abs(fit.residual)
-        return fit.only(size <= OUTLIER * broad_scale(size))
+        return fit.only((size <= OUTLIER * broad_scale(size)) | near[fit.middle])
 
     fit = raise_degree(fitted, fitted())
     if fit.middle.size < FEWEST_EDGES:
-        return 1.0, math.inf, math.inf
-    moved = np.interp(np.arange(times.size), fit.middle, fit.slope) * off
+        return _Share(1.0, math.inf, math.inf)
+    rough = fit.residual[near[fit.middle]] / max(broad_scale(np.abs(fit.residual)), 1e-300)
+    moved = np.interp(np.arange(stamps.size), fit.middle, fit.slope) * (stamps - even.times)
     points = 2 * fit.neighbours + 1
-    other = local_fit(times, moved, degree=points - 5, points=points)
+    other = local_fit(even.times, moved, degree=points - 5, points=points)
     follows = np.interp(fit.middle, other.middle, other.residual)
     power = max(float(follows @ follows), 1e-300)
     share = float(follows @ fit.residual) / power
     left = float(np.mean((fit.residual - share * follows) ** 2))
-    return share, math.sqrt(left * fit.sum_of_squares / power), fit.rms
+    return _Share(share, math.sqrt(left * fit.sum_of_squares / power), float(rough @ rough))
 
 
 def repeated(work: Work) -> Finding | None:

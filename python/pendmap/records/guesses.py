@@ -210,7 +210,6 @@ def side_by_side(table: Table) -> list[Table]:
             table,
             names=tuple(table.names[k] for k in block),
             values=table.values[rows][:, block],
-            dated=(),
             texts={},
             **{name: getattr(table, name)[rows] for name in taken},
         )

@@ -17,7 +17,6 @@ from pendmap.formatting import counted, moment
 from pendmap.records.clock import longest_between
 from pendmap.records.noise import DEGREES, fastest
 from pendmap.records.rod_sensors import angle_of_rate
-from pendmap.records.slips import MOST_INTERVALS, slips_of
 from pendmap.records.steps import sides_of
 from pendmap.records.work import Jump
 from pendmap.signal.local_polynomial import POINTS, local_fit
@@ -41,7 +40,7 @@ MOST_TOGETHER: Final = 6  # Most neighbouring outliers that are distinguished fr
 WEIGHT_STEPS: Final = 10  # Iterations of the weights of least absolute deviations
 CERTAIN_JUMP: Final = 7.0  # Standard errors above which a step is a jump
 OFF_COUNT: Final = 0.25  # Greatest deviation of a corrected jump from whole counts, counts
-MOST_JUMPS: Final = 20  # Most jumps that are corrected
+MOST_INTERVALS: Final = 4  # Longest slip of a clock, intervals
 OFF_FRAME: Final = 0.05  # Greatest deviation of a slip from half or whole frames, frames
 OFF_TURN: Final = 0.1  # Greatest deviation of a jump from whole turns, rad
 OTHER_RECORD: Final = 0.5  # Size of a jump, rad, above which a second recording may begin
@@ -133,10 +132,17 @@ def _judged(
     seen: Work, at: Indices, scale: Floats
 ) -> list[tuple[int, slice | Indices, Jump | None]]:
     """Return suspects, with outliers and jumps; jumps near outliers are judged after them."""
-    verdicts = [
-        (k, *_by_sides(seen, k, _judge(seen.time, seen.theta, k, sigma, seen.count)))
+    alone = [
+        (k, _judge(seen.time, seen.theta, k, sigma, seen.count))
         for k, sigma in zip(at.tolist(), scale.tolist(), strict=True)
     ]
+    jumps = np.array([k for k, (_, jump) in alone if jump is not None])
+    place, verdicts = np.arange(seen.time.size), []
+    for k, verdict in alone:
+        low = np.max(jumps[jumps < k - SIDE], initial=-1)
+        high = np.min(jumps[jumps > k + SIDE], initial=place.size)
+        piece = dataclasses.replace(seen, trusted=seen.trusted & (place > low) & (place < high))
+        verdicts.append((k, *_by_sides(piece, k, verdict)))
     spikes = np.array([k for k, group, jump in verdicts if jump is None and seen.rows[group].size])
     return [
         (k, group, jump)
@@ -239,20 +245,6 @@ def _least_absolute(columns: Floats, y: Floats) -> Floats:
 
 
 def slips(work: Work) -> Finding | None:
-    """Correct the clock for jumps that are its slips."""
-    if not work.jumps:
-        return None
-    clock = None if work.clock_stderr else slips_of(work.time, work.bridged)
-    if clock is None:
-        return _slips_of_jumps(work)
-    number, size, error = counted(clock.places.size, "slip"), 1e3 * clock.slip, 1e3 * clock.stderr
-    finding = work.finding("time-slips", at=clock.places, slips=number, size=size, error=error)
-    work.time = clock.time
-    work.jumps = [j for j in work.jumps if np.min(np.abs(clock.places - j.at)) > SIDE]
-    return finding
-
-
-def _slips_of_jumps(work: Work) -> Finding | None:
     """Move the times after each jump that is a slip of the clock."""
     late = [jump for jump in work.jumps if jump.slip]
     if not late:
@@ -260,7 +252,7 @@ def _slips_of_jumps(work: Work) -> Finding | None:
     work.jumps = [jump for jump in work.jumps if not jump.slip]
     sizes = ", ".join(f"{1e3 * jump.slip:+.3g}" for jump in late[:4])
     at = np.array([jump.at for jump in late])
-    finding = work.finding("time-slips.each", at=at, slips=counted(at.size, "slip"), sizes=sizes)
+    finding = work.finding("time-slips", at=at, slips=counted(at.size, "slip"), sizes=sizes)
     for jump in late:
         work.time[jump.at :] += jump.slip
     # A frame that comes twice has the time of the one before.
@@ -280,8 +272,6 @@ def jumps(work: Work) -> Finding | None:
         return None
     places = np.asarray([jump.at for jump in work.jumps], np.intp)
     number = counted(places.size, "jump")
-    if places.size > MOST_JUMPS:
-        return work.finding("missed-counts.many", at=places, jumps=number)
     sizes = [jump.size for jump in work.jumps]
     turns = [round(size / math.tau) for size in sizes]
     off = [abs(size - n * math.tau) for size, n in zip(sizes, turns, strict=True)]

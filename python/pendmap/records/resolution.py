@@ -114,7 +114,11 @@ def spread_stamps(time: Floats) -> Floats:
     stamps, first, number = np.unique(time, return_index=True, return_counts=True)
     tick = float(np.min(np.diff(stamps))) if stamps.size > 1 else 0.0
     place = np.arange(time.size) - np.repeat(first, number)
-    share = (place + 0.5) / np.repeat(number, number) - 0.5
+    # The record has a part of the first and the last tick.
+    whole = number.copy()
+    whole[[0, -1]] = np.maximum(number[[0, -1]], round(float(np.median(number))))
+    place[: number[0]] += whole[0] - number[0]
+    share = (place + 0.5) / np.repeat(whole, number) - 0.5
     return np.asarray(time + share * tick)
 
 
