@@ -85,3 +85,10 @@ def experiment(folder: Path, description: str, **files: str) -> pendmap.Experime
     for name, content in files.items():
         (folder / f"{name}.csv").write_text(content, encoding="utf-8")
     return pendmap.read_experiment(folder)
+
+
+def words(given: dict[str, Any]) -> list[str]:
+    """Return keywords of reading as options of the command line."""
+    names = {"rate_hz": "rate", "from_s": "from", "to_s": "to"}
+    pairs = [(names.get(k, k.replace("_", "-")), str(v)) for k, v in given.items()]
+    return [word for name, value in pairs for word in (f"--{name}", value)]

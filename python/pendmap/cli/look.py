@@ -31,10 +31,10 @@ if TYPE_CHECKING:
 def command(*, path: Path, write_experiment: bool, **given: Any) -> None:  # noqa: ANN401 (outputs)
     """Describe the contents and faults of a record, before anything is fitted.
 
-    A FILE (CSV or other text, Parquet, Excel) has a time and an angle; a FOLDER has an
-    experiment.toml, or each of its files is a free run. Channels, rate, noise without a model,
-    releases and rest, gaps, outliers, missed counts, units: unambiguous faults are corrected on
-    reading and reported. The files are not changed.
+    A FILE (CSV or other text, .xlsx, .ods, Parquet, .mat, .zip, .trk) has a time and an angle; a
+    FOLDER has an experiment.toml, or each of its files is a free run. Channels, rate, noise
+    without a model, releases and rest, gaps, outliers, missed counts, units: unambiguous faults
+    are corrected on reading and reported. The files are not changed.
     """
     from pendmap.records import files_of
     from pendmap.records.by_hand import save_description

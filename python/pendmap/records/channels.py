@@ -14,6 +14,7 @@ from pendmap.records.by_hand import by_hand
 from pendmap.records.description import Column
 from pendmap.records.guesses import (
     ANGLE_CHANNELS,
+    axes_of,
     changes,
     guess,
     head_of,
@@ -175,10 +176,16 @@ def _missing(table: Table, places: Mapping[str, int], where: str, *, timed: bool
     free = {*range(len(table.names))} - {*places.values(), *columns.values()}
     if free and not any(channel in ANGLE_CHANNELS for channel in {**places, **columns}):
         columns["angle"] = min(free)
+    axes = [] if {*ANGLE_CHANNELS} & {*places} else axes_of(table)
+    if axes:
+        columns, why = columns | {"velocity": axes[0]}, ", where a sensor has the axes x, y and z"
+        columns.pop("angle", None)
     if not timed:
-        columns |= {c: places[c] for c in ("angle", "velocity") if c in places}
+        known = [c for c in places if c in {"angle", "velocity"} or c.startswith("pixel")]
+        pair = [c for c in known if c.startswith("pixel")]
+        columns |= {c: places[c] for c in pair or known}
         rate = {} if "time" in columns else {"rate_hz": 100}
-    elif "angle" in columns:
+    elif "angle" in columns and not axes:
         heading = Heading.of(table.names[columns["angle"]])
         unit = spelling(heading.unit or ("px" if heading.meaning in {"x", "y"} else ""))
         if unit in LENGTHS:

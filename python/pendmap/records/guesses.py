@@ -26,6 +26,7 @@ RISING: Final = 0.9  # Least share of rising steps of a clock
 DECAYED: Final = 0.9  # Greatest spread of a decayed last quarter, over that of the first
 LEAST_CROSSINGS: Final = 3  # Fewest crossings of the middle of what swings
 MOST_CROSSED: Final = 1 / 3  # Share of the steps of noise, half of which cross, that do in a swing
+LEAST_FILLED: Final = 0.1  # Least share of the rows in which a column of readings has a number
 ON_ARC: Final = 0.7  # Greatest distance from a circle, over that from a line, of places on an arc
 COPIED: Final = 0.9999  # Least correlation of the readings of a copy in another unit
 BY_UNIT: Final = 4  # Rank of a heading that fits by its unit alone
@@ -36,6 +37,8 @@ def guess(table: Table, places: dict[str, int], *, timed: bool) -> list[Finding]
     """Assign missing channels by the words and units of headings, or without names by values."""
     by = _by_name if any(table.names) else likely
     guessed = by(table, places, timed=timed)
+    if axes_of(table):  # of a sensor: no places
+        guessed = {c: k for c, k in guessed.items() if not c.startswith("pixel")}
     if "time" in places and any(channel in places for channel in ANGLE_CHANNELS):
         guessed = {c: k for c, k in guessed.items() if c in {"velocity", "trigger"}}
     # An angle given with pixel coordinates was computed from them.
@@ -93,12 +96,19 @@ def _nameless(head: Heading, letters: str) -> bool:
     return head.unit is None and head.meaning in {"", "plain", "smooth", *letters}
 
 
+def axes_of(table: Table) -> list[int]:
+    """Return the columns x, y and z without a unit, the axes of a sensor, the widest first."""
+    axes = [k for k, name in enumerate(table.names) if name.strip().lower() in {"x", "y", "z"}]
+    return sorted(axes, key=lambda k: -np.nanstd(table.values[:, k])) if len(axes) == 3 else []
+
+
 def _nameless_angle(table: Table, places: Mapping[str, int]) -> dict[str, int]:
     """Return the column that may be the angle where no heading says so: one alone, or a decay."""
     # Beside a column "X" of times "Y" is no place.
     clock = Heading.of(table.names[places["time"]]).meaning if "time" in places else ""
     free = [k for k in range(len(table.names)) if k not in places.values()]
     free = [k for k in free if _nameless(Heading.of(table.names[k]), "xy" if clock == "x" else "")]
+    free = [k for k in free if k not in axes_of(table)]
     best = _swinging(table, free)
     alone = len(best) == 1 or (best and decays(table.values[:, best[0]]))
     return {"angle": best[0]} if alone else {}
@@ -130,13 +140,16 @@ def in_order(values: Floats) -> bool:
 def likely(table: Table, places: Mapping[str, int], *, timed: bool) -> dict[str, int]:
     """Return by their values the columns of missing times, what is in order, and angles.
 
-    The angle swings smoothly from side to side; of several the first that decays is taken.
+    What counts the readings is no time. The angle swings smoothly from side to side; of several the
+    first that decays is taken.
     """
-    free = [k for k in range(len(table.names)) if k not in places.values()]
     columns, taken = table.values.T, dict[str, int]()
+    free = [k for k in range(len(table.names)) if k not in places.values()]
+    free = [k for k in free if np.isfinite(columns[k]).mean() > LEAST_FILLED]
     ordered = [k for k in free if in_order(columns[k]) or rises(columns[k])]
-    if timed and "time" not in places and ordered:
-        taken["time"] = next((k for k in ordered if rises(columns[k])), ordered[0])
+    clocks = [k for k in ordered if np.any(np.diff(columns[k]) != 1)]
+    if timed and "time" not in places and clocks:
+        taken["time"] = next((k for k in clocks if rises(columns[k])), clocks[0])
     moving = [k for k in free if k not in ordered and changes(columns[k])]
     swinging = _swinging(table, moving)
     if swinging and not any(channel in places for channel in ANGLE_CHANNELS):

@@ -69,11 +69,11 @@ def read_experiment(
 ) -> Experiment:
     """Read a record or a folder of records, and report its faults.
 
-    A file (CSV, other text, Parquet, Excel), a table in memory or two arrays with a time and an
-    angle are an experiment of one free decay. A folder is an experiment with an
-    ``experiment.toml``; without it each file is a free decay. Each free release of a file is one
-    run, named ``decay 1/3``. Nothing is written. Each fault is a finding under a stable key. Data
-    are corrected only where the correction is unambiguous: wrapped turns are unwrapped,
+    A file (CSV, other text, .xlsx, .ods, Parquet, .mat, .zip, .trk), a table in memory or two
+    arrays with a time and an angle are an experiment of one free decay. A folder is an experiment
+    with an ``experiment.toml``; without it each file is a free decay. Each free release of a file
+    is one run, named ``decay 1/3``. Nothing is written. Each fault is a finding under a stable key.
+    Data are corrected only where the correction is unambiguous: wrapped turns are unwrapped,
     milliseconds become seconds. ``Run.trusted`` marks the samples for fitting.
 
     Parameters

@@ -313,8 +313,8 @@ def _parts(line: str, columns: Sequence[Column], form: _Form) -> list[str]:
     numbered = line[0] == '"' and np.all(np.diff(first.values) == 1)
     if len(names) == width - 1 > 1 and (first.kind == "text" or numbered):
         return ["", *names]  # as R numbers the rows
-    # Columns at the end may be empty.
-    fits = len(parts) >= width and (len(names) <= form.width or form.delimiter in "\t;|")
+    # Columns at the end may be empty, and settings may stand beside the names.
+    fits = len(parts) >= width and (len(names) <= form.width or form.delimiter != " ")
     return [part.strip() for part in parts[:width]] if fits else []
 
 

@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 import pendmap
-from recorded import clean, experiment, found, motion, text
+from recorded import clean, experiment, found, motion, text, words
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -48,13 +48,6 @@ UNITS = {
     "counts": {"angle_unit": "counts", "counts_per_turn": 400},
     "gyroscope": {"angle_unit": "deg"},
 }
-
-
-def words(given: dict[str, Any]) -> list[str]:
-    """Return keywords as options."""
-    names = {"rate_hz": "rate", "from_s": "from", "to_s": "to"}
-    pairs = [(names.get(k, k.replace("_", "-")), str(v)) for k, v in given.items()]
-    return [word for name, value in pairs for word in (f"--{name}", value)]
 
 
 def same(one: pendmap.Experiment, other: pendmap.Experiment) -> None:
