@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 STILL_SPAN: Final = 8.0  # Range of readings below which there is no motion, over the noise
 FOLDED: Final = 0.97  # Reading over the gain, of an accelerometer, near a quarter turn
 NOISE_SPAN: Final = 0.1  # Range, rad, below which readings dominated by noise show no motion
+FAR_HOLD: Final = 0.05  # Distance of a hold from the middle of the swings, over their range
 FEWEST_HALF_CYCLES: Final = 5  # Fewest half cycles of a release that is a run, about three swings
 MOST_LISTED: Final = 6  # Most releases whose times are listed in a message
 
@@ -86,11 +87,16 @@ def free_motions(work: Work) -> Finding | None:
 
 
 def _middle(work: Work) -> float:
-    """Return the middle of the last swings before a rest or hold at the end, or the median, rad."""
+    """Return the middle of the last swings, rad, before a hold far from it, or else the median."""
     time, theta = work.time[work.trusted], work.theta[work.trusted]
     moving = np.flatnonzero(np.abs(theta - theta[-1]) > work.limit)
-    middle = middle_of(time[: moving[-1]], theta[: moving[-1]]) if moving.size else None
-    return float(np.median(theta)) if middle is None else middle
+    middle = middle_of(time, theta)
+    if middle is None:
+        return float(np.median(theta))
+    before = middle_of(time[: moving[-1]], theta[: moving[-1]]) if moving.size else None
+    if before is None or abs(before - middle) <= FAR_HOLD * float(np.ptp(theta)):
+        return middle
+    return before
 
 
 def _below_a_quarter_turn(work: Work) -> Finding | None:

@@ -84,16 +84,15 @@ def _warnings(joint: JointFit, estimates: Mapping[str, Estimate]) -> list[str]:
             f"viscous damping and Coulomb friction alone did not converge: {joint.added} is fitted "
             "too"
         )
-    every = {**estimates, **joint.negative}
-    for name in opposing(fit.model.effects):
-        if name in every and every[name].value < 0:
-            _, high = every[name].ci95 or (-math.inf, math.inf)
+    for name, e in {**estimates, **joint.negative}.items():
+        if name in opposing(fit.model.effects) and e.value < 0:
+            _, high = e.ci95 or (-math.inf, math.inf)
             why = "an effect is missing in the model" if high < 0 else "its interval reaches 0"
             if name in joint.negative:
                 why += "; it is held at 0, and the others are fitted again"
             elif name in OPPOSING:
                 why += "; the model has 0 in its place"
-            warnings.append(f"{name} is {every[name].value:.3g}, which is unphysical: {why}")
+            warnings.append(f"{name} is {e.value:.3g}, which is unphysical: {why}")
     if fit.widening > 1:
         warnings.append(
             f"the model does not fit: residuals are {fit.rms / joint.noise:.3g} times the noise; "
