@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.errors import InputError, short_repr
-from pendmap.identification.report import DRAG
+from pendmap.identification.methods.trajectory import DRAG
 from pendmap.model.effects import Effect, definition, library
 from pendmap.model.formula import Formula
 from pendmap.model.rig import own_name

@@ -26,13 +26,13 @@ from pendmap.identification.methods.registry import (
     identify_peaks,
 )
 from pendmap.identification.methods.trajectory import (
+    DRAG,
     JointFit,
     fit_together,
     identification_of,
-    physical,
 )
 from pendmap.identification.peaks import Peaks, find_peaks
-from pendmap.identification.report import DRAG, IdentificationReport
+from pendmap.identification.report import IdentificationReport
 from pendmap.identification.table1 import table_of_run
 from pendmap.identification.turning import TooShortError
 from pendmap.model import Rig
@@ -193,10 +193,10 @@ def _with_drag(joint: JointFit) -> JointFit | None:
     The squared residual beyond the noise must be at most half of that without it.
     """
     noise = float(np.mean([np.mean(reading.each) for reading in joint.readings]))
-    if joint.fit.rms < MISSES * noise:
+    if joint.added or joint.fit.rms < MISSES * noise:
         return None
     try:
-        with_drag = physical(fit_together(joint.runs, start=joint.fit.model, effects=[DRAG]))
+        with_drag = fit_together(joint.runs, start=joint.fit.model, effects=[DRAG])
     except FitDiverged:
         return None
     drag = next(effect for effect in with_drag.fit.model.effects if effect.name == DRAG)
@@ -221,7 +221,7 @@ def _best(
     if experiment.w0 is not None:
         known["w0"] = experiment.w0
     try:
-        joint = physical(fit_together(runs, start=start or known, effects=effects))
+        joint = fit_together(runs, start=start or known, effects=effects)
     except TooShortError as error:
         if effects:
             raise

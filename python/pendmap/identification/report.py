@@ -11,7 +11,7 @@ import numpy as np
 from pendmap.errors import InputError
 from pendmap.formatting import counted, estimate_text, interval, percent
 from pendmap.identification.engineering import QUANTITIES, lines_of, quantities, swing_amplitude
-from pendmap.identification.methods.trajectory import identification_of
+from pendmap.identification.methods.trajectory import DRAG, identification_of
 from pendmap.identification.parameters import OFFSET, SENSOR
 from pendmap.identification.results import FitResult, Followed
 from pendmap.records.summary import doubts, finding_lines
@@ -29,9 +29,6 @@ if TYPE_CHECKING:
     from pendmap.identification.table1 import Table1
     from pendmap.model import Rig
     from pendmap.records import Experiment, Run
-
-DRAG: Final = "quadratic_drag"
-"""Effect that is tried by default if viscous damping and friction do not explain a record."""
 
 COLUMNS: Final = {
     "w0": "w0 (rad/s)",

@@ -112,7 +112,8 @@ def _named(table: Table, asked: Mapping[str, Column], where: str) -> dict[str, i
     for channel, kind in CHANNELS.items():
         place = table.names.index(kind.default) if kind.default in table.names else -1
         # [columns] may say that theta_rad holds turning points: then it holds no angles.
-        if place >= 0 and place not in places.values() and changes(table.values[:, place]):
+        peaks = channel == "angle" and place == places.get("peaks")
+        if place >= 0 and not peaks and changes(table.values[:, place]):
             places.setdefault(channel, place)
     # A channel without a column is none that is looked for.
     return places | {channel: -1 for channel, column in asked.items() if column.unused}

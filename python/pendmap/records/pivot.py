@@ -23,9 +23,7 @@ if TYPE_CHECKING:
 FARTHEST_PIVOT: Final = {"m": 3.0, "m/s": 60.0, "m/s2": 3000.0}  # Greatest plausible span by unit
 PIVOT_ORDER: Final = {"m": 2, "m/s": 1}  # Order of differentiation to an acceleration, by unit
 NOISE_SHARE: Final = 0.05  # Greatest noise of the pivot's acceleration, over its largest value
-STEPS_PASSED: Final = 4.0  # Fewest resolution steps that a moving pivot passes within a window
 LONGEST_WINDOW: Final = 0.2  # Longest window of more than five readings, s
-MOVING_SHARE: Final = 0.2  # Speed, over the largest, above which the pivot is moving
 
 
 def pivot_unit(work: Work) -> Finding | None:
@@ -46,22 +44,21 @@ def pivot_steps(work: Work) -> Finding | None:
     interval, even = even_times(work.time)
     if not even.size:
         return None
-    places = {way: np.interp(even, work.time, values) for way, values in work.pivot.items()}
-    windows = [
-        _cubic_window(places[way], step_of(values), order, interval)
-        for way, values in work.pivot.items()
-        if np.ptp(values) > 0
-    ]
-    if not windows or max(windows) < 7:
+    longest, places = 0, {}
+    for way, values in work.pivot.items():
+        places[way] = np.interp(even, work.time, values)
+        if np.ptp(values) > 0:
+            window = _cubic_window(places[way], step_of(values), order, interval)
+            longest = max(longest, window)
+    if longest < 7:
         return None
     from scipy.signal import savgol_filter
 
     for way, values in places.items():
-        pushed = savgol_filter(values, max(windows), 3, deriv=order, delta=interval)
+        pushed = savgol_filter(values, longest, 3, deriv=order, delta=interval)
         work.pivot[way] = np.interp(work.time, even, pushed)
     what = "places" if order == 2 else "speeds"
     work.pivot_unit = "m/s2"
-    longest = max(windows)
     seconds = longest * interval
     return work.finding("pivot-smoothed", what=what, readings=longest, seconds=seconds)
 
@@ -78,9 +75,6 @@ def _cubic_window(values: Floats, step: float, order: int, interval: float) -> i
     for window in range(5, most + 1, 2):
         gain = float(np.linalg.norm(savgol_coeffs(window, 3, deriv=order, delta=interval)))
         pushed = savgol_filter(values, window, 3, deriv=order, delta=interval)
-        change = np.abs(savgol_filter(values, window, 3, deriv=1, delta=interval))
-        speed = float(np.median(change[change >= MOVING_SHARE * change.max()]))
-        passed = speed * window * interval >= STEPS_PASSED * step
-        if passed and gain * noise <= NOISE_SHARE * float(np.max(np.abs(pushed))):
+        if gain * noise <= NOISE_SHARE * float(np.max(np.abs(pushed))):
             return window
     return most - (most + 1) % 2

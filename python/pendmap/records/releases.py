@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.formatting import counted, listed
-from pendmap.records.driven import free_part, pushes
-from pendmap.signal.half_cycles import after_turns, swings
+from pendmap.records.driven import GAP, free_part, half_cycles, pushes
 from pendmap.signal.robust import stretches
 
 if TYPE_CHECKING:
@@ -20,11 +19,9 @@ if TYPE_CHECKING:
 
 RELEASE_RISE: Final = 0.1  # Relative growth of a swing that only a hand causes
 LONG_HALF: Final = 1.4  # Duration of a half cycle, over the usual one, that only a hand causes
-GAP: Final = 4.0  # Intervals without a reading that make the duration of a half cycle uncertain
 HELD_LONGER: Final = 1.5  # Delay, over that of a release from rest, above which there is a hold
 LEFT: Final = 0.2  # Angle, rad, or a quarter of it, by which a motion has left a hold
 NEAR_UPRIGHT: Final = 0.05  # Sine of an angle below which a release is too slow to detect
-FEWEST_HALF_CYCLES: Final = 5  # Fewest half cycles of a release that is a run, about three swings
 BETWEEN_LEVELS: Final = 0.02  # Greatest share of samples between the two levels of a trigger
 DEAD_BAND: Final = 0.2  # Half-width of the hysteresis band, over the distance of the levels
 RELEASES_APART: Final = 3.0  # Least time between releases, periods of small swings
@@ -40,32 +37,6 @@ def releases(work: Work, parts: list[Stretch]) -> list[Stretch]:
     return pieces if begin is None else [(begin, pieces[0][1]), *pieces[1:]]
 
 
-def _seen(work: Work) -> float:
-    """Return the distance from a hold above which a reading is not part of it, rad."""
-    return max(6 * work.noise, 1.5 * work.count, 1e-4)
-
-
-def _left(work: Work, part: Stretch, level: float) -> int | None:
-    """Return the first index of three consecutive readings off a level, on one side; or None."""
-    good = np.flatnonzero(work.trusted[slice(*part)]) + part[0]
-    off, seen = work.theta[good] - level, _seen(work)
-    away = np.where(off > seen, 1, np.where(off < -seen, -1, 0))
-    runs = np.flatnonzero((away[:-2] != 0) & (away[:-2] == away[1:-1]) & (away[1:-1] == away[2:]))
-    return int(good[runs[0]]) if runs.size else None
-
-
-def enough(work: Work, part: Stretch) -> bool:
-    """Return whether a release has enough half cycles for a run."""
-    good = np.flatnonzero(work.trusted[slice(*part)]) + part[0]
-    if not good.size:
-        return False
-    theta = work.theta[good] - work.middle
-    theta -= 2 * math.pi * round(float(np.median(theta)) / (2 * math.pi))  # remove whole turns
-    start = after_turns(theta)
-    half = swings(work.time[good][start:], theta[start:], least=work.limit)
-    return half.peak.size >= FEWEST_HALF_CYCLES
-
-
 def _let_go(work: Work, good: Indices, until: int) -> int:
     """Return the index at which a motion has left a hold; ``until`` it first passes the middle."""
     fall = good[(work.time[good] > work.time[until] - 0.3 * work.period) & (good < until)]
@@ -74,17 +45,13 @@ def _let_go(work: Work, good: Indices, until: int) -> int:
     return int(held[-1]) + 1 if held.size else until
 
 
-def grown(work: Work, part: Stretch) -> list[Stretch]:  # noqa: C901 (a sign of a hand each)
+def grown(work: Work, part: Stretch) -> list[Stretch]:
     """Divide a motion where a hand took the pendulum: swings that grow or last too long."""
     from scipy.ndimage import median_filter
 
     low, high = part
-    good = np.flatnonzero(work.trusted[low:high]) + low
-    if good.size < 5:
-        return []
-    good = good[after_turns(work.theta[good] - work.middle) :]
-    time, theta = work.time[good], work.theta[good] - work.middle
-    half = swings(time, theta, least=work.limit)
+    good, theta, half = half_cycles(work, part)
+    time = work.time[good]
     if half.peak.size < 4:
         return [part]
     # The readings after the last crossing may be those of a hand.
@@ -134,32 +101,24 @@ def held_short(work: Work, part: Stretch) -> int | None:
 
     Returns None if it leaves its first level as early as after a release from rest.
     """
-    low = part[0]
-    if not work.trusted[low : low + 5].all():
-        return None
-    # The first readings give the level of the hold, then all readings near it.
-    left = low
-    for _ in range(2):
-        level = float(np.median(work.theta[low : max(low + 5, (low + left) // 2)]))
-        away = _left(work, part, level)
-        if away is None:
-            return None
-        left = away
+    low, high = part
+    good = np.flatnonzero(work.trusted[low:high]) + low
+    level = float(np.median(work.theta[low : low + 5]))
+    seen = max(6 * work.noise, 1.5 * work.count, 1e-4)
+    off = np.abs(work.theta[good] - level) > seen
+    away = np.flatnonzero(off[:-2] & off[1:-1] & off[2:])
     pull = abs(math.sin(level - work.middle))
-    if pull < NEAR_UPRIGHT:
+    if not away.size or pull < NEAR_UPRIGHT or not work.trusted[low : low + 5].all():
         return None
-    usual = math.sqrt(2 * _seen(work) / pull) * work.period / (2 * math.pi)
+    left = int(good[away[0]])
+    usual = math.sqrt(2 * seen / pull) * work.period / (2 * math.pi)
     interval = float(np.median(np.diff(work.time)))
     held = work.time[left] - work.time[low] > HELD_LONGER * usual + 4 * interval
     return left if held else None
 
 
 def edges_of(values: Floats, edge: str | None = None) -> tuple[Indices, str]:
-    """Return the first samples after each edge, and the direction of the edges.
-
-    Missing values keep the level. By default rising edges are used, or falling ones if there are no
-    others. Without two levels there are no edges.
-    """
+    """Return the first samples after each edge, by default rising ones, and their direction."""
     seen = values[np.isfinite(values)]
     low, high = float(np.min(seen, initial=np.inf)), float(np.max(seen, initial=-np.inf))
     middle, band = (low + high) / 2, DEAD_BAND * (high - low)
@@ -178,27 +137,22 @@ def marked(work: Work) -> Finding | None:
     if not work.parts or "trigger" not in work.extra:
         return None
     places, edge = edges_of(work.extra["trigger"], work.edge)
-    if not places.size:
-        return work.finding("trigger-unlike.none", edge=edge)
     edges: list[int] = []  # without bounces
     for k in places.tolist():
         if not edges or work.time[k] - work.time[edges[-1]] > work.period:
             edges.append(k)
     apart = np.diff(work.time[edges])
-    if apart.size and np.median(apart) < RELEASES_APART * work.period:
-        number = counted(len(edges), f"{edge} edge")
-        return work.finding("trigger-unlike.often", edges=number, apart=np.median(apart))
+    often = apart.size and np.median(apart) < RELEASES_APART * work.period
     motions = []
-    for low, high in itertools.pairwise([*edges, work.time.size]):
+    for low, high in itertools.pairwise([] if often else [*edges, work.time.size]):
         after = [(max(a, low), min(b, high)) for a, b in work.parts if a < high and b > low]
         if after:
             a, b = max(after, key=lambda part: part[1] - part[0])
             # The trigger locates the release to a sample, the angle to a fraction of a swing.
             motions.append((low if work.time[a] - work.time[low] < work.period else a, b))
     if not motions:
-        return work.finding("trigger-unlike.still")
+        return work.finding("trigger-unlike", edge=edge)
     work.parts = motions
     times = listed([f"{work.time[k]:.6g}" for k in edges], 6)
-    number, bounces = counted(len(edges), "release"), places.size - len(edges)
-    more = f"; {counted(bounces, 'bounce')} left out" if bounces else ""
-    return work.finding("trigger-release", edge=edge, releases=number, times=times, bounces=more)
+    number = counted(len(edges), "release")
+    return work.finding("trigger-release", edge=edge, releases=number, times=times)

@@ -53,10 +53,7 @@ def drive(work: Work) -> Finding | None:
     drive = (work.plan.drive.Omega if work.plan.drive else 0.0) / math.tau
     if rate >= NYQUIST * drive:
         return None
-    number, alias = rate / drive, abs(drive - rate * round(drive / rate))
-    return work.finding(
-        "drive-unresolved", drive=drive, rate=rate, number=number, least=NYQUIST, alias=alias
-    )
+    return work.finding("drive-unresolved", drive=drive, rate=rate, least=NYQUIST * drive)
 
 
 def gain(work: Work) -> Finding | None:
@@ -80,17 +77,13 @@ def step_of(theta: Floats) -> float:
     # Written digits round the multiples of a step: neighbours differ by the step to a digit.
     least = float(np.quantile(apart, 0.02))
     near = apart[(apart >= 0.5 * least) & (apart < 1.5 * least)]
-    step = float(np.median(near)) if near.size else least
-    multiples = np.round(apart / step)
+    multiples = np.round(apart / (np.median(near) if near.size else least))
     small = multiples < 50
-    if step <= 0 or not np.any(multiples[small] > 0):
+    if not np.any(multiples[small] > 0):
         return 0.0
-    step = float(np.sum(apart[small]) / max(np.sum(multiples[small]), 1.0))
-    away = (values - values[0]) / step
-    away = away - np.round(away)
-    phase = np.angle(np.mean(np.exp(2j * np.pi * away))) / (2 * np.pi)
-    away = away - phase
-    away -= np.round(away)
+    step = float(np.sum(apart[small]) / np.sum(multiples[small]))
+    turns = np.exp(2j * np.pi * (values - values[0]) / step)
+    away = np.angle(turns / np.mean(turns)) / (2 * np.pi)
     return step if float(np.sqrt(np.mean(away**2))) < ON_STEPS else 0.0
 
 

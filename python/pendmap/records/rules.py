@@ -97,7 +97,7 @@ RULES: Final[Rules] = (
     ("sampled", pivot.pivot_steps),
 )
 # Rules of each release of a record
-OF_RELEASE: Final[Rules] = (("moves", motion.zero), ("moves", noise.grows))
+OF_RELEASE: Final[Rules] = (("moves", noise.grows),)
 
 
 def apply(rules: Rules, work: Work) -> None:

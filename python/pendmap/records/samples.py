@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -37,14 +37,9 @@ def step(work: Work) -> None:
     """Set the step of the readings, rad, from the description or the readings."""
     if not work.edges:
         work.estimated_step = step_of(work.theta)
-    work.count = _count(work)
-
-
-def _count(work: Work) -> float:
-    """Return the step of the readings, rad, from the description or the readings."""
     counts, seen = work.known.get("encoder_counts"), work.estimated_step
     count = 2 * math.pi / float(counts) if counts else seen
-    return seen if seen > 1.5 * count and work.theta.size > 200 else count
+    work.count = seen if seen > 1.5 * count and work.theta.size > 200 else count
 
 
 def named_step(work: Work) -> Finding | None:
@@ -55,7 +50,6 @@ def named_step(work: Work) -> Finding | None:
     if work.edges:
         return work.finding("edges-logged", turn=turn, edges=counted(work.theta.size, "edge"))
     counts, seen = work.known.get("encoder_counts"), work.estimated_step
-    work.count = _count(work)
     if counts is None and seen > FINEST:
         return work.finding("counts-seen", step=seen, turn=turn)
     if counts is not None and work.count == seen > 3 * math.pi / float(counts):
@@ -77,8 +71,7 @@ def clipped(work: Work) -> Finding | None:
         hits = [
             (a, b)
             for a, b in zip(low[ended[low]], high[ended[low]], strict=True)
-            if a > 0 and b < work.theta.size and b - a > EQUAL_READINGS - 0.5
-            if _abrupt(work, a, b)
+            if a > 0 and b < work.theta.size and _abrupt(work, a, b)
         ]
         if len(hits) > 1 or (hits and hits[0][1] - hits[0][0] > 4 * EQUAL_READINGS):
             ends.append(f"{end:.4g}")
@@ -89,33 +82,29 @@ def clipped(work: Work) -> Finding | None:
 
 def frozen(work: Work) -> Finding | None:
     """Mark constant readings in the middle of a motion."""
-    low, high = equal_runs(work.theta, EQUAL_READINGS)
     marked = np.zeros(work.theta.size, bool)
     change = np.diff(work.theta)
-    for a, b in zip(low, high, strict=True):
+    for a, b in zip(*equal_runs(work.theta, EQUAL_READINGS), strict=True):
         if a < 3 or b > work.theta.size - 3 or not work.trusted[a]:
             continue
         before, jump = change[a - 1], change[b - 1]
         quick = abs(jump) > 3 * max(abs(before), work.count)
         if jump * before > 0 and quick and _abrupt(work, a, b):
             marked[a:b] = True
-    at = np.flatnonzero(marked)
-    return work.distrust(at, "frozen", "sample")
+    return work.distrust(np.flatnonzero(marked), "frozen", "sample")
 
 
 def _abrupt(work: Work, low: int, high: int) -> bool:
     """Return whether a plateau is flatter than a turning point, within v tau/2 of its extreme."""
     reach = max(high - low, 4)
-    sides = (slice(max(low - reach, 0), low), slice(high, high + reach))
-    slopes = [
-        float(np.ptp(work.theta[side]) / np.ptp(work.time[side]))
-        for side in sides
-        if work.theta[side].size > 1
-    ]
-    missed = min(slopes, default=-math.inf) * float(work.time[high - 1] - work.time[low]) / 4
+    slope = math.inf
+    for side in (slice(max(low - reach, 0), low), slice(high, high + reach)):
+        if work.theta[side].size > 1:
+            slope = min(slope, float(np.ptp(work.theta[side]) / np.ptp(work.time[side])))
+    missed = slope * float(work.time[high - 1] - work.time[low]) / 4
     noise = float(np.median(np.abs(np.diff(work.theta, 2)))) if work.theta.size > 2 else 0.0
     # The extreme of a parabola is half of this above its ends: a count, and more by friction.
-    return missed > 4 * work.count + 3 * min(noise, 0.01)
+    return math.inf > missed > 4 * work.count + 3 * min(noise, 0.01)
 
 
 def measured(time: Floats, theta: Floats) -> tuple[str, int, Indices] | None:
@@ -165,13 +154,14 @@ def interpolated(work: Work) -> Finding | None:
     made, ratio, places = readings
     samples = work.time.size
     rate = (samples - 1) / float(work.time[-1] - work.time[0])
-    how = "each held" if made == "held" else f"{made} between"
-    from_hz, to_hz = f"{rate / ratio:.6g} Hz", f"{rate:.6g} Hz"
+    values: dict[str, Any] = {
+        "from_hz": f"{rate / ratio:.6g} Hz",
+        "to_hz": f"{rate:.6g} Hz",
+        "how": "each held" if made == "held" else f"{made} between",
+    }
     if work.pivot:
         # The pivot may have been read at every sample.
-        return work.finding("interpolated.pivot", from_hz=from_hz, to_hz=to_hz, how=how)
+        return work.finding("interpolated.pivot", **values)
     work.keep(places)
     number = counted(places.size, "reading")
-    return work.finding(
-        "interpolated", from_hz=from_hz, to_hz=to_hz, how=how, readings=number, samples=samples
-    )
+    return work.finding("interpolated", readings=number, samples=samples, **values)

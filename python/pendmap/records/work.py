@@ -126,10 +126,7 @@ class Work:
 
     def leave_out(self, which: Mask, key: str, noun: str, **values: object) -> Finding | None:
         """Remove samples, if any, and return the finding with their ``number``."""
-        at = np.flatnonzero(which)
-        if not at.size:
-            return None
-        finding = self.finding(key, at=at, span=None, number=counted(at.size, noun), **values)
+        finding = self.distrust(np.flatnonzero(which), key, noun, **values)
         self.keep(~which)
         return finding
 
@@ -147,16 +144,15 @@ class Work:
         lows = [0, *(low for low, _ in self.releases[1:])]
         highs = [*(high for _, high in self.releases[:-1]), self.time.size]
         shared, parts = list(self.findings), []
-        for k, (low, high) in enumerate(zip(lows, highs, strict=True)):
-            begin, end = float(self.time[low]), float(self.time[high - 1])
-            inside = [f for f in shared if _within(f.from_s, f.to_s, begin, end)]
-            shared = [f for f in shared if f not in inside]
+        for (first, last), low, high in zip(self.releases, lows, highs, strict=True):
+            ends = float(self.time[low]), float(self.time[high - 1])
             part = dataclasses.replace(
                 self,
-                findings=inside,
-                segments=[s for s in self.segments if _within(s.from_s, s.to_s, begin, end)],
-                releases=[(self.releases[k][0] - low, self.releases[k][1] - low)],
+                findings=[finding for finding in shared if _within(finding, *ends)],
+                segments=[segment for segment in self.segments if _within(segment, *ends)],
+                releases=[(first - low, last - low)],
             )
+            shared = [finding for finding in shared if not _within(finding, *ends)]
             part.keep(np.arange(low, high))
             parts.append(part)
         return parts, shared
@@ -175,5 +171,6 @@ class Work:
             )
 
 
-def _within(low: float | None, high: float | None, begin: float, end: float) -> bool:
+def _within(part: Finding | Segment, begin: float, end: float) -> bool:
+    low, high = part.from_s, part.to_s
     return low is not None and high is not None and begin <= low <= high <= end

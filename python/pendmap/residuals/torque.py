@@ -24,7 +24,7 @@ import numpy as np
 from scipy.fft import dct
 
 from pendmap.identification.engineering import swing_amplitude
-from pendmap.identification.report import DRAG
+from pendmap.identification.methods.trajectory import DRAG
 from pendmap.identification.sensitivity import window_slopes
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from pendmap import InputError, render
 from pendmap.comparison import compare
 from pendmap.comparison.data import split_records
 from pendmap.identification import identified_model, identify
-from pendmap.identification.methods.trajectory import fit_together
+from pendmap.identification.methods.trajectory import fit_trusted
 from pendmap.identification.report import as_text
 from pendmap.records import Experiment, Run, summary
 
@@ -209,7 +209,7 @@ def test_a_gyroscope_in_a_forced_run(tmp_path: Path) -> None:
     text = f'[[run]]\nfile = "run.csv"\nkind = "forced"\n{drive}\n'
     (tmp_path / "experiment.toml").write_text(text, encoding="utf-8")
     runs = pendmap.read_experiment(tmp_path).runs
-    fit = fit_together(runs, start=pendmap.Rig(w0=6.2, c_over_m=0.2, Tr=0.01)).fit
+    fit = fit_trusted(runs, pendmap.Rig(w0=6.2, c_over_m=0.2, Tr=0.01), ()).fit
     assert fit.widening == 1
     agrees(fit, {"w0": 6.2, "c_over_m": 0.3, "Tr": 0.0, "bias": 0.01}, 3.5)
 

@@ -87,7 +87,7 @@ def test_times_and_steps_are_printed_with_their_digits(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text(text((time + 1732209590.125, np.round(theta, 6))))
     there = pendmap.read_experiment(path)
-    assert "1732209590.125 to 1732209610.125 s" in as_text(there)
+    assert "0 to 20 s" in as_text(there)  # since the first of times since 1970
     # The last digit of a file is no counter.
     assert there.runs[0].count_rad == pytest.approx(1e-6)
     assert "a turn" not in as_text(there)

@@ -131,6 +131,20 @@ def test_a_fall_whose_fit_does_not_converge_is_used_from_where_it_left_upright(
     assert not any("not used" in line for line in as_lines(report))
 
 
+def test_quadratic_drag_is_fitted_where_damping_and_friction_do_not_converge() -> None:
+    drag = pendmap.Effect("quadratic_drag", {"q": 0.05})
+    rig = pendmap.Rig(w0=W0, c_over_m=0.003, effects=(drag,))
+    time = TIME[::2]
+    theta = noisy(pendmap.simulate(rig, theta=2.5, velocity=0.0, t_eval=time).theta, 0.002)
+    report = pendmap.identify(time, theta, methods=["trajectory"])
+    assert report.best["w0"] == pytest.approx(W0, rel=1e-4)
+    assert report.best["quadratic_drag.q"] == pytest.approx(0.05, rel=0.01)
+    assert "quadratic_drag.q" in report.text_parts()[1][0]
+    assert "did not converge: quadratic_drag is fitted too" in report.warnings[0]
+    with pytest.raises(pendmap.InputError, match="did not converge"):
+        _ = pendmap.identify(time, theta, methods=["trajectory"], start=pendmap.Rig(w0=W0)).model
+
+
 def test_a_turning_point_in_counts_is_not_clipped() -> None:
     time = np.arange(0, 6, 1e-4)
     size = np.maximum(0.066 - 0.0105 * time, 0)  # friction flattens each turning point

@@ -411,7 +411,7 @@ def test_json_keeps_the_contract(pendmap_command: Command, tmp_path: Path) -> No
     assert 0 < result["noise"]["sigma"] < 0.01
     assert [segment["what"] for segment in result["segments"]] == ["held", "motion"]
     keys = {finding["what"] for finding in result["findings"]}
-    assert {"time-gap", "time-jitter", "outliers", "held-start", "zero-offset"} <= keys
+    assert {"time-gap", "time-jitter", "outliers", "held-start"} <= keys
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.svg", "odd.csv"]
 
 

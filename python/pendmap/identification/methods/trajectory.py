@@ -7,7 +7,9 @@ from release to rest, including stops, and all parameters are fitted jointly to 
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import itertools
 import math
 from typing import TYPE_CHECKING, Any, Final
 
@@ -35,32 +37,26 @@ if TYPE_CHECKING:
     from pendmap.identification.runs import FitRun
     from pendmap.records import Run
 
-NEAR_UPRIGHT: Final = 0.3
-"""Angle from upright, rad, within which a fit that does not converge does not follow a run."""
-
-MOST_LEFT: Final = 0.5
-"""Least share of a run's readings that is fitted from where it leaves the upright position."""
-
-LACKING: Final = 4.0
-"""Widening above which readings have equal weights: else the slowest alone would dominate."""
+DRAG: Final = "quadratic_drag"  # Effect tried where viscous damping and friction do not fit
+NEAR_UPRIGHT: Final = 0.3  # Angle from upright, rad, within which no fit may follow a run
+MOST_LEFT: Final = 0.5  # Least share of a run that is fitted from where it leaves upright
+LACKING: Final = 4.0  # Widening above which weights are equal: else the slowest would dominate
 
 
 def identification_of(joint: JointFit) -> Identification:
     """Return the identification from a fit."""
     fit, runs = joint.fit, joint.runs
     part = span(runs[0].time) if len(runs) == 1 else counted(len(runs), "free run")
-    renamed = {f"{OFFSET}.d": "offset"}
-    names = tuple(renamed.get(name, name) for name in fit.names)
+    names = tuple("offset" if name == f"{OFFSET}.d" else name for name in fit.names)
     # If the model does not fit, errors are widened by the misfit.
     wider = math.sqrt(fit.widening)
-    estimates = {
+    known = {
         name: dataclasses.replace(e, stderr=None if e.stderr is None else wider * e.stderr)
         for name, e in zip(names, fit.estimates.values(), strict=True)
     }
-    for name, limit in joint.limits.items():
-        estimates[name] = Estimate(0.0, None, (0.0, limit))
-    first = [name for name in ("w0", *OPPOSING) if name in estimates]
-    estimates = {name: estimates[name] for name in dict.fromkeys([*first, *estimates])}
+    known |= {name: Estimate(0.0, None, (0.0, limit)) for name, limit in joint.limits.items()}
+    order = dict.fromkeys(["w0", *OPPOSING, *known])
+    estimates = {name: known[name] for name in order if name in known}
     count = len(fit.windows)
     motions = "one motion" if len(runs) == 1 else f"{len(runs)} motions"
     how = f"as {motions}" if count == len(runs) else f"in {count} windows"
@@ -83,16 +79,20 @@ def identification_of(joint: JointFit) -> Identification:
 
 def _warnings(joint: JointFit, estimates: Mapping[str, Estimate]) -> list[str]:
     fit, readings, warnings = joint.fit, joint.readings, []
-    every = {**estimates, **joint.negative}
-    for name in opposing(fit.model.effects):
-        if name in every and every[name].value < 0:
-            _, high = every[name].ci95 or (-math.inf, math.inf)
+    if joint.added:
+        warnings.append(
+            f"viscous damping and Coulomb friction alone did not converge: {joint.added} is fitted "
+            "too"
+        )
+    for name, e in {**estimates, **joint.negative}.items():
+        if name in opposing(fit.model.effects) and e.value < 0:
+            _, high = e.ci95 or (-math.inf, math.inf)
             why = "an effect is missing in the model" if high < 0 else "its interval reaches 0"
             if name in joint.negative:
                 why += "; it is held at 0, and the others are fitted again"
             elif name in OPPOSING:
                 why += "; the model has 0 in its place"
-            warnings.append(f"{name} is {every[name].value:.3g}, which is unphysical: {why}")
+            warnings.append(f"{name} is {e.value:.3g}, which is unphysical: {why}")
     if fit.widening > 1:
         warnings.append(
             f"the model does not fit: residuals are {fit.rms / joint.noise:.3g} times the noise; "
@@ -184,7 +184,8 @@ class JointFit:
     """Fit of a pendulum to several runs, in the order of its curves and residuals.
 
     ``negative`` are coefficients that oppose the motion and that a fit made negative, as it gave
-    them: they are held at 0 in ``fit``, and ``limits`` are their upper 95 % limits.
+    them: they are held at 0 in ``fit``, and ``limits`` are their upper 95 % limits. ``added`` is
+    the effect without which the search does not converge.
     """
 
     fit: TrajectoryFit
@@ -192,6 +193,7 @@ class JointFit:
     readings: tuple[Reading, ...]
     negative: Mapping[str, Estimate] = dataclasses.field(default_factory=dict)
     limits: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    added: str = ""
 
     @property
     def given(self) -> list[FitRun]:
@@ -211,20 +213,26 @@ def fit_together(
     runs: Sequence[Run],
     *,
     start: Rig | Mapping[str, float] | None = None,
-    held: Collection[str] = (),
     effects: Sequence[Effect | str] = (),
 ) -> JointFit:
     """Fit natural frequency, damping, the sensor's zero error and effects to one or more runs.
 
-    The choices are those of :func:`fit_from_start`. Where the search does not converge, runs are
-    used from where they leave the upright position, near which every error grows.
+    The choices are those of :func:`fit_from_start`. Where the search does not converge, quadratic
+    drag is fitted too, unless effects or a model to start from are given; else runs are used from
+    where they leave the upright position, near which every error grows.
     """
-    joint = fit_trusted(runs, start, held, effects)
     later = [_from_upright(run) for run in runs]
-    if joint.fit.converged or all(run is cut for run, cut in zip(runs, later, strict=True)):
-        return joint
-    again = fit_trusted(later, start, held, effects)
-    return again if again.fit.converged else joint
+    fixed = effects or isinstance(start, Rig)
+    first = None
+    for used, added in itertools.product((runs, later), ("",) if fixed else ("", DRAG)):
+        if used is later and all(run is cut for run, cut in zip(runs, later, strict=True)):
+            break
+        with contextlib.suppress(FitDiverged):
+            joint = physical(fit_trusted(used, start, [added] if added else effects))
+            if joint.fit.converged and (not added or min(joint.fit.model.effects[0].values) > 0):
+                return dataclasses.replace(joint, added=added)
+            first = first or joint
+    return first or fit_trusted(runs, start, effects)
 
 
 def _from_upright(run: Run) -> Run:
@@ -245,13 +253,12 @@ def _from_upright(run: Run) -> Run:
 def fit_trusted(
     runs: Sequence[Run],
     start: Rig | Mapping[str, float] | None,
-    held: Collection[str],
     effects: Sequence[Effect | str],
 ) -> JointFit:
     """Return the fit to all trusted readings of runs."""
     readings = [reading_of_run(run) for run in runs]
     given = [as_fit_run(run, reading) for run, reading in zip(runs, readings, strict=True)]
-    fit, worth = fit_from_start(given, readings, start=start, held=held, effects=effects)
+    fit, worth = fit_from_start(given, readings, start=start, effects=effects)
     return JointFit(fit, tuple(runs), worth)
 
 
@@ -270,5 +277,5 @@ def physical(joint: JointFit) -> JointFit:
             limits = {n: max(upper_limit(fit, given, n), -e.value) for n, e in known.items()}
         except FitDiverged:
             return joint
-        joint = JointFit(fit, joint.runs, worth, known, limits)
+        joint = JointFit(fit, joint.runs, worth, known, limits, joint.added)
     return joint
