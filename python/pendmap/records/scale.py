@@ -128,7 +128,7 @@ def gain_interval(periods: Periods) -> tuple[float, float]:
     share, error = share_of(periods, growth(periods.amplitude))
     least, most = share - Z95 * error, share + Z95 * error
     # Of wide swings the growth is more than the square of the angle.
-    wide = factor_of(periods, share)[0] / math.sqrt(share) if share > 3 * error else 1.0
+    wide = factor_of(periods, share)[0] / math.sqrt(share) if share > max(3 * error, 0.0) else 1.0
     low = 1 / (wide * math.sqrt(max(most, LEAST_GROWTH)))
     return low, 1 / (wide * math.sqrt(least)) if least > 0 else math.inf
 

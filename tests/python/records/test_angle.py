@@ -279,7 +279,7 @@ def test_a_record_without_outliers_has_no_finding(
 def test_each_text_of_a_finding_is_used() -> None:
     used = set()
     root = Path(pendmap.__file__).parent
-    for path in [*(root / "records").glob("*.py"), *(root / "tables").glob("*.py")]:
+    for path in root.rglob("*.py"):
         nodes = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
         used |= {node.value for node in nodes if isinstance(node, ast.Constant)} & set(texts())
     assert used == set(texts())

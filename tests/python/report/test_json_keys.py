@@ -103,12 +103,14 @@ def test_the_table_has_the_keys_that_are_printed(tmp_path: Path, pendmap_command
         run = pendmap_command(command, *words, "--json")
         assert run.stdout, run.stderr
         printed[command].update(paths(json.loads(run.stdout)))
-    # What no small record leads to: a model or a part that diverges, two equally good fits.
+    # What no small record leads to: a part that diverges, equally good fits, a shape that is tried.
     report, result = (pendmap.load(tmp_path / name) for name in ("a.nc", "b.nc"))
     table = dataclasses.replace(report.table, lost={"log_decrement": "it diverges"})
     report = dataclasses.replace(report, table=table)
     twin = dataclasses.replace(result.effects[0], elsewhere={"torque": -0.5})
-    result = dataclasses.replace(result, effects=(twin,), reasons={"forecast": "it diverges"})
+    tried = dataclasses.replace(result.attempts[0], shape={"n": 2.0}, held_out_gain=1.0)
+    changes: dict[str, Any] = {"effects": (twin,), "attempts": (tried,)}
+    result = dataclasses.replace(result, reasons={"forecast": "it diverges"}, **changes)
     printed["identify"].update(paths(json.loads(json_text(identified(report)))))
     printed["diagnose"].update(paths(json.loads(json_text(diagnosed(result)))))
 
