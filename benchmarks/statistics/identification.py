@@ -25,7 +25,7 @@ from benchmarks.peers.report import machine, note, say, table
 from pendmap.identification import Estimate, Identification, Peaks, find_peaks, identify
 from pendmap.identification.methods import combined, lines
 from pendmap.identification.period import mean_period
-from pendmap.identification.table1 import State, peak_errors
+from pendmap.identification.table1 import State, errors_of, peak_errors, simulated_peaks
 from pendmap.virtual_rig.effects.base import Drive
 from pendmap.virtual_rig.equation import Equation, Parameters
 from pendmap.virtual_rig.integrator import integrate
@@ -69,9 +69,11 @@ def recipe_errors() -> dict[str, float]:
     exact, wanted = truths["free_decay"]["nonlinear"][0], truths["decrement_recipe"][0]
     peaks = Peaks.of(np.array(exact["times"], float)[:-1], np.array(exact["thetas"], float)[:-1])
     small, _ = combined.small_peaks(peaks)
-    made = combined.from_amplitudes(np.abs(small.amplitude), small.time, "all", 0)
-    names = ("delta", "zeta", "theta_r", "mean_period", "w0", "Tr")
-    return {name: abs(getattr(made, name) - wanted[name]) for name in names}
+    size = np.abs(small.amplitude)
+    w0, _, friction = combined.from_amplitudes(np.concatenate((size, small.time)))
+    made = {"delta": combined.decrement(size), "theta_r": combined.coulomb(size)}
+    made |= {"w0": w0, "Tr": friction}
+    return {name: abs(value - wanted[name]) for name, value in made.items()}
 
 
 def motion() -> Motion:
@@ -113,10 +115,7 @@ def choices(peaks: Peaks) -> dict[str, Identification]:
     for floor in (0.0, 3.0):
         some = peaks.turned
         some = some.select(np.abs(some.amplitude) >= math.radians(floor))
-        for reading in ("all", "odd_ends", "odd_triplets"):
-            made[f"combined, {reading}, {floor:g} to 12 deg"] = combined.from_peaks(
-                some, reading=reading
-            )
+        made[f"combined, {floor:g} to 12 deg"] = combined.from_peaks(some)
         for cut in (12.0, 30.0, 90.0, 180.0):
             name = f"log_decrement, {floor:g} to {cut:g} deg"
             made[name] = lines.log_decrement(some, cut=math.radians(cut))
@@ -208,7 +207,9 @@ def misses(found: Identification, truth: Peaks, start: State) -> tuple[float, fl
     A peak that a simulation lacks, because it has come to rest, is taken as 0 rad; its period is
     left out.
     """
-    errors = peak_errors(found, truth, start, offset=0.0)
+    begun = dataclasses.replace(start, theta=start.theta - found.zero)
+    times, angles = simulated_peaks(found.rig, begun, 1.2 * float(truth.time[-1]) + 5.0)
+    errors = errors_of(found.method, truth, times, angles)
     peak = np.where(np.isnan(errors.peak_error), -100.0, errors.peak_error) / 100 * errors.peak
     period = errors.period_error / 100 * errors.period
     known = period[np.isfinite(period)]
@@ -271,7 +272,7 @@ def spoilers(path: Motion, count: int) -> None:
     ):
         sensor = SENSOR if noise else dataclasses.replace(SENSOR, noise=0.0, counts=0)
         cells = []
-        for name in ("combined", "combined_odd_ends", "combined_odd_triplets", "combined_repaired"):
+        for name in ("combined", "combined_repaired"):
             made = []
             for seed in range(count if noise else 1):
                 times, angles = record(path, seed, offset, sensor)
@@ -281,7 +282,7 @@ def spoilers(path: Motion, count: int) -> None:
                     made.append(misses(found, truth, start)[0])
             cells.append(f"{np.median(made):.2e}" if made else "-")
         rows.append((label, *cells))
-    headers = ("spoiled by", "as printed", "odd ends", "odd triplets", "repaired")
+    headers = ("spoiled by", "as printed", "repaired")
     say("Error of the simulated peaks against the truth, rad rms, medians")
     say(table(headers, rows))
 

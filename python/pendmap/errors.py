@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import difflib
 import math
 import numbers
 from typing import TYPE_CHECKING, Any, Final
@@ -137,12 +138,19 @@ def shown_key(key: object) -> str:
     return key if isinstance(key, str) and key.isidentifier() else short_repr(key)
 
 
-def check_keys(where: str, given: Iterable[object], known: Collection[str]) -> None:
+def check_keys(
+    where: str, given: Iterable[object], known: Collection[str], among: str = ""
+) -> None:
     """Raise InputError if a key is not among the known ones; ``where`` begins the message."""
     for key in given:
         if key not in known:
-            names = ", ".join(known)
-            raise InputError(f"{where}{shown_key(key)} is not known: it must be one of {names}")
+            lower = {name.lower(): name for name in known}
+            near = difflib.get_close_matches(str(key).lower(), lower, 1, 0.55)
+            perhaps = f", perhaps {lower[near[0]]} is meant" if near else ""
+            names = among or ", ".join(known)
+            raise InputError(
+                f"{where}{shown_key(key)} is not known{perhaps}: it must be one of {names}"
+            )
 
 
 def check_flag(name: str, value: object) -> bool:

@@ -14,13 +14,13 @@ from pendmap.analysis.trajectory import simulate
 from pendmap.charts import half_cycles, names
 from pendmap.charts.chart import Axis, Chart, Panel, Sheet, bare, holding, nothing
 from pendmap.charts.marks import QUIET, Band, Line, Mark, Points, Span, Table, Text
-from pendmap.charts.palette import MEASURED, NOISE, NOISE_SAID, drawn, look
+from pendmap.charts.palette import MEASURED, NOISE, NOISE_SAID, look
 from pendmap.charts.record import FEW, history
 from pendmap.errors import InputError
 from pendmap.formatting import estimate_text, typographic
 from pendmap.identification.engineering import swing_amplitude
 from pendmap.identification.methods.registry import BEST
-from pendmap.identification.report import SHORT, run_entries, table1_table
+from pendmap.identification.report import in_line, run_entries, table1_table
 from pendmap.identification.table1 import first_state, simulated_peaks
 from pendmap.signal.robust import Z95, span
 
@@ -48,13 +48,8 @@ QUANTITIES: Final = {"w0": "w0 (rad/s)", "c_over_m": "c/m (1/s)", "Tr": "Tr (rad
 def sheet(report: IdentificationReport) -> Chart:
     """Return the record, a close view of the fit, its residual, and the envelope."""
     run, best, joint = report.run, report.sound, report.joint
-    known = {} if best is None else best.estimates
-    parts = [
-        f"{symbol} = {estimate_text(known[name])} {unit.replace('^2', '²')}"
-        for name, (symbol, unit) in SHORT.items()
-        if name in known
-    ]
-    text = ",  ".join(parts) or "no method gives a model"
+    known = "" if best is None else in_line(best.estimates).replace("^2", "²")
+    text = known or "no method gives a model"
     whole = dataclasses.replace(history(run), name="record", title="record")
     rows = [[whole], [_envelope_of_fit(report)]]
     if joint is not None:
@@ -177,7 +172,7 @@ def simulated(report: IdentificationReport) -> dict[str, Decay]:
     if report.table.left_out or len(report.peaks.turned) < 3:  # noqa: PLR2004 (one full cycle)
         return {}
     made = {}
-    for name in drawn(report.methods):
+    for name in report.methods:
         result = report.methods[name]
         if not result.applicable or "w0" not in result.estimates or name in report.table.lost:
             continue
@@ -265,9 +260,8 @@ def errors(report: IdentificationReport) -> Chart:
     title, known = "Errors of simulated periods and peaks", report.table.errors
     if report.table.left_out or not known:
         return nothing(title, report.table.left_out or NOTHING)
-    shown = {name: known[name] for name in drawn(known)}
     titles = ("of each period", "of each peak; time runs to the left")
-    return Chart(title, "", [error_panels(shown, report.peaks, titles)], size=(WIDTH, 3.6))
+    return Chart(title, "", [error_panels(known, report.peaks, titles)], size=(WIDTH, 3.6))
 
 
 def error_panels(

@@ -17,8 +17,6 @@ import numpy as np
 import numpy.typing as npt
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from pendmap._core import Attractor
 
 UNDECIDED = "#e4e4e4"  # Cells not decided within the bound (label 0)
@@ -178,8 +176,6 @@ class Look(NamedTuple):
 _LOOKS: Final = {
     "trajectory": Look("trajectory", "#0072b2"),
     "combined": Look("combined, as printed", "#d55e00"),
-    "combined_odd_ends": Look("combined, odd ends", "#7a2a00", "-."),
-    "combined_odd_triplets": Look("combined, odd triplets", "#f0a070", ":"),
     "combined_repaired": Look("combined, repaired", "#009e73", "--"),
     "log_decrement": Look("log decrement", "#e69f00"),
     "de_paula": Look("de Paula", "#cc79a7"),
@@ -191,17 +187,8 @@ _LOOKS: Final = {
 }
 """Colours of Okabe and Ito for methods drawn together."""
 _OTHER: Final = "#8a8a8a"
-_READINGS: Final = ("combined", "combined_odd_ends", "combined_odd_triplets")
-"""Variants of the printed method; if the first is not applicable, another is drawn instead."""
 
 
 def look(method: str) -> Look:
     """Return the look of a method; an unknown one is grey under its own name."""
     return _LOOKS.get(method) or Look(method.replace("_", " "), _OTHER)
-
-
-def drawn(methods: Iterable[str]) -> list[str]:
-    """Return the methods to draw: all but further variants of the printed one."""
-    there = list(methods)
-    printed = [name for name in _READINGS if name in there][:1]
-    return [name for name in there if name not in _READINGS or name in printed]

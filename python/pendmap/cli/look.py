@@ -37,8 +37,8 @@ def command(*, path: Path, write_experiment: bool, **given: Any) -> None:  # noq
     reading and reported. The files are not changed.
     """
     from pendmap.records import files_of
+    from pendmap.records.by_hand import save_description
     from pendmap.records.description import NAME
-    from pendmap.records.overrides import save_description
     from pendmap.records.read import read_described
     from pendmap.records.summary import as_json, as_text
 

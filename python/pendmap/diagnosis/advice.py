@@ -25,10 +25,8 @@ if TYPE_CHECKING:
     from pendmap.records import Run
 
 DETECTION_PROBABILITY: Final = 0.95  # Probability of detection of an effect at its detection limit
-
 LARGE: Final = 1.0  # Swings from which records show drag and the angle's harmonics, rad
 SMALL: Final = 0.1  # Last swing over the largest from which a decay is not seen to its end
-
 UNDETECTABLE: Final = 10.0
 """Limit over the largest typical size above which an effect is undetectable."""
 

@@ -21,8 +21,8 @@ from pendmap.comparison.forecast import (
 from pendmap.diagnosis.advice import Advice, advise
 from pendmap.diagnosis.named import NamedEffect, effect_values
 from pendmap.diagnosis.table import HEAD, NOTE, Standings
-from pendmap.formatting import Estimate, estimate_text
-from pendmap.identification.report import SHORT
+from pendmap.formatting import Estimate
+from pendmap.identification.report import in_line
 from pendmap.identification.results import ARRAYS, FitResult, Followed
 from pendmap.model.effects import definition
 from pendmap.model.labels import unit_of
@@ -66,11 +66,7 @@ PLACES: Final[dict[str, str]] = {
 """Text before the bin of a missing torque, by quantity."""
 
 TORQUE: Final = unit_of("torque")  # Unit of a torque per moment of inertia
-
 WHERE: Final = 3  # Number of bins of a residual torque in the summary
-
-"""End of the line of an effect whose name is approximate."""
-
 MOST_EFFECTS: Final = 3  # Default of the largest number of effects that are added
 
 
@@ -303,12 +299,7 @@ def as_text(result: Discrepancy) -> Iterator[str]:
     yield from doubt_lines(result.data.experiment, *runs)
     gap, assessment = result.gap, result.assessment
     yield f"Verdict: {result.verdict}: {SAID[result.verdict]}"
-    known = result.parameters
-    yield "Model: " + ", ".join(
-        f"{symbol} = {estimate_text(known[name])} {unit}"
-        for name, (symbol, unit) in SHORT.items()
-        if name in known
-    )
+    yield f"Model: {in_line(result.parameters)}"
     for effect in result.effects:
         units = {n: unit_of(f"{effect.name}.{n}", result.definition) for n in effect.parameters}
         ci95 = sure_intervals(effect)
@@ -337,16 +328,16 @@ def as_text(result: Discrepancy) -> Iterator[str]:
     if assessment.identified:
         by = "" if result.effects else " by the nearest effects"
         yield f"Share of the squared gap closed{by}: {100 * max(assessment.closed, 0.0):.0f} %"
-    yield from zeroed(result)
-    yield from _between(result)
-    yield from confined(result)
+    yield from _remarks(result)
     for row in result.clearest[:WHERE]:
         what = "torque along the motion" if row["along_motion"] else "torque"
         yield (
             f"Where: a {what} of {row['torque']:.3g} {TORQUE} is missing {PLACES[row['over']]} "
             f"{row['from']:.3g} to {row['to']:.3g} {row['unit']} ({row['z']:.1f} standard errors)"
         )
-    yield from _further(result)
+    if result.advice.next_experiment is not None:
+        yield f"Next: {result.advice.next_experiment}"
+    yield from (f"Not computed: {name}: {why}" for name, why in result.not_computed.items())
     yield from finding_lines(result.data.experiment, *runs)
     yield NOTE
 
@@ -360,8 +351,10 @@ def sure_intervals(effect: NamedEffect) -> dict[str, tuple[float, float] | None]
     }
 
 
-def _between(result: Discrepancy) -> Iterator[str]:
-    """Yield a line for each parameter that differs between runs by more than its error."""
+def _remarks(result: Discrepancy) -> Iterator[str]:
+    """Yield what is special about parameters and effects of the best model."""
+    for name in result.best.fitted.zeroed:
+        yield f"{name} is fixed at 0: the fit would make it negative, which is unphysical"
     for name in result.best.fitted.fit.names:
         between = result.runs.between(name)
         if between > 0:
@@ -370,14 +363,9 @@ def _between(result: Discrepancy) -> Iterator[str]:
                 f"{unit_of(name, result.definition)}".rstrip()
                 + ", more than its error: intervals include this"
             )
-
-
-def _further(result: Discrepancy) -> Iterator[str]:
-    """Yield the recommended next record, and the parts that were not computed."""
-    if result.advice.next_experiment is not None:
-        yield f"Next: {result.advice.next_experiment}"
-    for field, reason in result.not_computed.items():
-        yield f"Not computed: {field}: {reason}"
+    for effect in result.best.fitted.fit.model.effects:
+        if effect.definition.mappable == "no":
+            yield f"{effect.name}: supported by simulate, compare and diagnose, but not by maps"
 
 
 def given_out(scored: ScoredModel) -> dict[str, float]:
@@ -392,31 +380,16 @@ def given_out(scored: ScoredModel) -> dict[str, float]:
     return values
 
 
-def confined(result: Discrepancy) -> Iterator[str]:
-    """Yield a line for each effect of the model that no map over initial conditions can include."""
-    for effect in result.best.fitted.fit.model.effects:
-        if effect.definition.mappable == "no":
-            yield f"{effect.name}: supported by simulate, compare and diagnose, but not by maps"
-
-
-def zeroed(result: Discrepancy) -> Iterator[str]:
-    """Yield a line for each coefficient fixed at 0."""
-    for name in result.best.fitted.zeroed:
-        yield f"{name} is fixed at 0: the fit would make it negative, which is unphysical"
-
-
 def ranking(result: Discrepancy) -> list[dict[str, Any]]:
     """Return name, shape, score and size of each effect at the baseline, the best first."""
-    level = result.base.fitted.noise.level
-    rows = []
-    for k in result.scores.best():
-        score = result.scores.scores[k]
-        rows.append(
-            {
-                "name": score.candidate.name,
-                "shape": score.candidate.shape_in(result.base.fitted.fit.model.units),
-                "score": score.gain / level,
-                "size": next(iter(score.start.values()), None),
-            }
-        )
-    return rows
+    base = result.base.fitted
+    scores = [result.scores.scores[k] for k in result.scores.best()]
+    return [
+        {
+            "name": score.candidate.name,
+            "shape": score.candidate.shape_in(base.fit.model.units),
+            "score": score.gain / base.noise.level,
+            "size": next(iter(score.start.values()), None),
+        }
+        for score in scores
+    ]

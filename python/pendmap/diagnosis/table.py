@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.formatting import Estimate, interval, with_error, written
+from pendmap.formatting import Estimate, interval, written
 from pendmap.model.labels import unit_of
 from pendmap.signal.robust import Z95
 
@@ -33,7 +33,6 @@ NOTE: Final = (
     "alike: indistinguishable; wider: does the same with more parameters; less: explains less"
 )
 MARKS: Final = ("alike", "wider", "less")  # How a rival stands to an effect of the best model
-EVEN: Final = 0.1  # Difference of the halves of an interval, over it, up to which it is even
 
 
 @dataclasses.dataclass(frozen=True)
@@ -130,11 +129,8 @@ class Standings:
             value = named.parameters[candidate.size]
             ends = named.ci95.get(candidate.size, (math.nan, math.nan))
             mark = f"{named.probability:.2f}{'*' if named.approximate else ''}"
-        low, high = ends
-        half = (high - low) / 2
-        size = with_error(value, half)
-        if abs(low + high - 2 * value) > EVEN * half:
-            size = f"{written(value, half)} {interval(Estimate(value, None, ends))}"
+        error = (ends[1] - ends[0]) / 2
+        size = f"{written(value, error)} {interval(Estimate(value, None, ends))}"
         bic = self._bic(candidate, one.gain)
         size = f"{size} {self._unit(candidate, candidate.size)}".rstrip()
         return Row(candidate, self._alone(candidate), one.closed, bic, size, mark)

@@ -151,8 +151,6 @@ def prepared(
     runs: Sequence[FitRun], model: Rig, free: Sequence[str], start: Mapping[str, float]
 ) -> tuple[Conversion, list[dict[str, Any]]]:
     """Return the free parameters, and the runs in the core's format."""
-    if not runs:
-        raise InputError("runs must have one record or more, got none")
     units = Units(model.w0, si=True)
     rigs = [rig_of(run, model) for run in runs]
     given = [bare_run(run, rig, units) for run, rig in zip(runs, rigs, strict=True)]
@@ -171,11 +169,8 @@ def _result(
     errors = [math.sqrt(variance) for variance in np.diag(covariance)]
     # Sizes with a free exponent have no profile: their intervals follow from the covariance.
     wide = math.sqrt(LEVEL * fit.widening)
-    intervals = {
-        k: interval(float(values[k]), wide * errors[k], mixed=True)
-        for k in unknown.mixed
-        if k in chosen
-    }
+    mixed = [k for k in unknown.mixed if k in chosen]
+    intervals = {k: interval(float(values[k]), wide * errors[k], mixed=True) for k in mixed}
     profiled = [k for k in chosen if k not in unknown.mixed]
     for k, pair in zip(profiled, fit.intervals, strict=True):
         both = [float(unknown.given([*bare[:k], end, *bare[k + 1 :]])[k]) for end in pair]
@@ -241,8 +236,7 @@ def _found_model(model: Rig, estimates: Mapping[str, Estimate]) -> Rig:
 MISSED: Final = 0.5
 """Rms residual over the readings' standard deviation above which a fit is refused."""
 
-FAR: Final = 1.0
-"""Rms residual, rad, above which a fit is refused, also for rotations."""
+FAR: Final = 1.0  # Rms residual, rad, above which a fit is refused, also for rotations
 
 
 def refuse_astray(path: Path, runs: Sequence[FitRun], fit: TrajectoryFit) -> None:

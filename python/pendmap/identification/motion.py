@@ -68,12 +68,11 @@ def _fit_motion(
         (k, 0, run.time.size, *state)
         for k, (run, state) in enumerate(zip(whole, states, strict=True))
     ]
-    values = motion.own
     return fit_runs(
         whole,
         motion.model,
-        tuple(name for name in values if name in OWN),
-        start=values,
+        tuple(name for name in motion.own if name in OWN),
+        start=motion.own,
         windows=windows,
         profiled=(),
         hold=True,

@@ -28,9 +28,7 @@ PLACES: Final[Mapping[str, tuple[str, float]]] = {"w0": ("gravity", 1)} | {
 }
 """Name in the core of each parameter of a rig, and the power of ``w0`` in its SI value."""
 
-SENSOR: Final = ("bias", "tilt")
-"""Parameters of a sensor on the rod, always fitted run by run."""
-
+SENSOR: Final = ("bias", "tilt")  # Parameters of a sensor on the rod, always fitted run by run
 OPPOSING: Final = ("c_over_m", "Tr")  # Coefficients that oppose the motion and are at least 0
 OFFSET: Final = "encoder_offset"  # Effect that is the sensor's zero error
 PER_RUN: Final = ("p", "Omega", "phi")  # Parameters of the drive of one run

@@ -71,9 +71,8 @@ class Finder:
         sizes = np.array([e.angle for e in ends if math.isfinite(e.stderr_angle)])
         if sizes.size < _SHOW:
             return ends
-        middle = (sizes[:-2] + 2 * sizes[1:-1] + sizes[2:]) / 4
-        sizes = np.abs(sizes - float(np.median(middle)))
-        theta_r = rough_damping(np.minimum(sizes, 3.1))[1]
+        middle = np.median((sizes[:-2] + 2 * sizes[1:-1] + sizes[2:]) / 4)
+        theta_r = rough_damping(np.minimum(np.abs(sizes - middle), 3.1))[1]
         return [e.late(theta_r) for e in ends]
 
     def window(self, amplitude: float) -> float:

@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats, Mask
 
 
+LEAST: Final = 1e-15  # Least noise of a reading, rad
 DITHERED: Final = 0.45
 """Noise (with rounding) over the count below which errors are correlated: intervals are fitted."""
-
 
 FEWEST_A_PERIOD: Final = 20.0
 """Fewest samples per period of small swings for polynomials: a quartic has nine in a window."""
@@ -49,16 +49,6 @@ class Reading:
     gain: float = 1.0  # sensor's reading over the equivalent angle
     unit: str = "rad"  # unit of the sensor's readings
 
-    @property
-    def alike(self) -> Floats:
-        """Uniform standard errors, rad, for a model that lacks an effect."""
-        return np.full(self.each.shape, self.sigma)
-
-    @property
-    def interval(self) -> float | None:
-        """Count, rad, if readings are fitted as intervals, else None."""
-        return self.count if self.coarse else None
-
 
 def reading_of(
     time: Floats,
@@ -71,7 +61,7 @@ def reading_of(
     """Return the standard errors of readings (rad, at times in s), from the trusted ones.
 
     The noise is that of :func:`pendmap.noise_floor`, with its growth with speed if any. With few
-    samples per period it is that of :func:`_noise_of_swings`, if that is less. It is at least
+    readings, or few a period, it is that of :func:`_noise_of_swings`, if less. It is at least
     ``count / sqrt(12)``. ``sigma`` and ``count`` (rad) are estimated unless they are given.
     """
     if count is None:
@@ -84,11 +74,11 @@ def reading_of(
         law = floor.law
         doubt = min(floor.stderr / floor.sigma, 1.0) if known else 1.0
         use = np.ones(time.size, bool) if trusted is None else trusted
-        if known and samples_per_period(time[use], theta[use]) < FEWEST_A_PERIOD:
-            left = _noise_of_swings(time[use], theta[use], sigma)
-            if left < sigma:
+        if not known or samples_per_period(time[use], theta[use]) < FEWEST_A_PERIOD:
+            left = _noise_of_swings(time[use], theta[use], max(sigma, LEAST))
+            if not known or left < sigma:
                 sigma, law = left, None
-    least = max(count / math.sqrt(12), 1e-15)
+    least = max(count / math.sqrt(12), LEAST)
     sigma = max(sigma, least)
     coarse = sigma < DITHERED * count
     if law is None:
@@ -139,7 +129,7 @@ def as_fit_run(run: Run, reading: Reading) -> FitRun:
         lab_time_s=run.lab_time_s + first,
         name=run.name,
         rod_sensor=_rod_sensor(run),
-        count=reading.interval,
+        count=reading.count if reading.coarse else None,
         clock_stderr=run.clock_stderr,
     )
 

@@ -232,29 +232,23 @@ class IdentificationReport(FitResult):
 
 def left_out(experiment: Experiment, read: Sequence[Run]) -> str:
     """Return the text on the runs that were used and not used; empty if all were used."""
-    reasons: Counter[tuple[str, str]] = Counter()  # words before and after "run"
-    # If held-out runs are used too, being held out is no reason.
-    held_too = any(used_run.hold_out for used_run in read)
-    for run in experiment.runs:
-        if any(run.name == used_run.name for used_run in read):
-            continue
+    held_too = any(run.hold_out for run in read)  # then being held out is no reason
+
+    def reason(run: Run) -> str:
         if run.copied:
-            why = "", " that copies another"
-        elif run.kind == "forced":
-            why = ("", " held out") if run.hold_out and not held_too else ("forced ", "")
-        elif run.peaks_only and (held_too or not run.hold_out):
-            why = "", " of peaks alone"
-        elif not run.moves:
-            why = "", " in which nothing moves"
-        else:
-            why = ("", " held out") if run.hold_out else ("shorter ", "")
-        reasons[why] += 1
-    if not reasons:
-        return ""
-    parts = [counted(n, f"{before}run") + after for (before, after), n in reasons.items()]
-    words = " and ".join(part for part in (", ".join(parts[:-1]), parts[-1]) if part)
-    verb = "is" if sum(reasons.values()) == 1 else "are"
-    return f"{counted(len(read), 'run')} read; {words} {verb} not used"
+            return "copied"
+        if run.hold_out and not held_too:
+            return "held out"
+        if run.kind == "forced":
+            return "forced"
+        if run.peaks_only:
+            return "of peaks alone"
+        return "held out" if run.hold_out else "shorter" if run.moves else "at rest"
+
+    names = {run.name for run in read}
+    reasons = Counter(reason(run) for run in experiment.runs if run.name not in names)
+    texts = [f"{count} {why}" for why, count in reasons.items()]
+    return f"{counted(len(read), 'run')} read; not used: {', '.join(texts)}" if texts else ""
 
 
 def as_json(report: IdentificationReport) -> dict[str, Any]:
@@ -267,10 +261,7 @@ def as_json(report: IdentificationReport) -> dict[str, Any]:
         "noise": report.peaks.sigma,
         "best": None if best is None else best.method,
         "doubts": foremost(report),
-        "quantities": {
-            name: None if one is None else dataclasses.asdict(one)
-            for name, one in ((name, known.get(name)) for name in QUANTITIES)
-        },
+        "quantities": {n: dataclasses.asdict(known[n]) if n in known else None for n in QUANTITIES},
         "q_amplitude_rad": report.largest_swing / 2 if "Q" in known else None,
         "methods": {name: _method(result) for name, result in report.methods.items()},
         "table1": [
@@ -313,11 +304,10 @@ def run_entries(report: IdentificationReport) -> list[dict[str, Any]]:
 
 def _method(result: Identification) -> dict[str, Any]:
     known = result.parameters
-    names = list(dict.fromkeys([*COLUMNS, *known]))
-    entry: dict[str, Any] = {name: known[name].value if name in known else None for name in names}
-    return entry | {
-        "stderr": {name: known[name].stderr if name in known else None for name in names},
-        "ci95": {name: known[name].ci95 if name in known else None for name in names},
+    every = {name: known.get(name) for name in (*COLUMNS, *known)}
+    return {name: e and e.value for name, e in every.items()} | {
+        "stderr": {name: e and e.stderr for name, e in every.items()},
+        "ci95": {name: e and e.ci95 for name, e in every.items()},
         "warnings": list(result.warnings),
         "used": result.used,
         "applicable": result.applicable,
@@ -348,13 +338,9 @@ def in_short(report: IdentificationReport) -> Iterator[str]:
     best = report.sound
     yield from (f"Warning: {text}" for text in foremost(report))
     if best is not None:
-        names = [*SHORT, *(n for n in best.estimates if n not in (*COLUMNS, *SHORT))]
-        yield ", ".join(
-            f"{symbol} = {estimate_text(best.parameters[name])} {unit}".rstrip()
-            for name in names
-            if name in best.parameters
-            for symbol, unit in [SHORT.get(name, (name, best.unit(name)))]
-        )
+        further = {n: e for n, e in best.estimates.items() if n not in COLUMNS}
+        texts = [f"{n} = {estimate_text(e)} {best.unit(n)}".rstrip() for n, e in further.items()]
+        yield ", ".join([in_line(best.parameters), *texts])
         yield from lines_of(report.quantities, report.largest_swing / 2)
         yield f"{best.method}: {best.used}"
     runs_text = left_out(report.experiment, report.runs)
@@ -370,6 +356,15 @@ def in_short(report: IdentificationReport) -> Iterator[str]:
             f"residual is {report.with_drag.fit.rms:.3g} rad, {report.joint.fit.rms:.3g} without: "
             f"--effect {DRAG} fits it, diagnose looks for more"
         )
+
+
+def in_line(known: Mapping[str, Estimate]) -> str:
+    """Return the parameters that are said first, with symbols and units."""
+    return ", ".join(
+        f"{symbol} = {estimate_text(known[name])} {unit}"
+        for name, (symbol, unit) in SHORT.items()
+        if name in known
+    )
 
 
 def foremost(report: IdentificationReport) -> list[str]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendmap.errors import InputError, short_repr
+from pendmap.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -26,8 +26,7 @@ EXACTNESS: Final = 1e-6
 SHARPEST: Final = 0.1
 """Least noise before rounding, over a count: without noise the likelihood is discontinuous."""
 
-TOLERANCES: Final = (1e-13, 1e-8)
-"""Least and greatest error per step that the integrator is set to."""
+TOLERANCES: Final = (1e-13, 1e-8)  # Least and greatest error per step that the integrator is set to
 
 
 @dataclasses.dataclass(frozen=True)
@@ -108,8 +107,6 @@ def rig_of(run: FitRun, model: Rig) -> Rig:
 
 def bare_run(run: FitRun, rig: Rig, units: Units) -> dict[str, Any]:
     """Return a run in the core's format."""
-    time = _floats("time", run.time)
-    theta = _floats("theta", run.theta)
     sigma = run.sigmas
     if not (np.all(np.isfinite(sigma)) and np.all(sigma > 0)):
         raise InputError("sigma must be finite numbers above 0, it is not everywhere")
@@ -122,8 +119,8 @@ def bare_run(run: FitRun, rig: Rig, units: Units) -> dict[str, Any]:
         longest = FORCED_WINDOW_SWINGS * math.tau / rig.w0 if run.forced else math.inf
     return {
         "model": rig.pendulum,
-        "time": units.bare(time, -1),
-        "reading": theta,
+        "time": units.bare(np.ascontiguousarray(run.time, np.float64), -1),
+        "reading": np.ascontiguousarray(run.theta, np.float64),
         "weight": np.ascontiguousarray(weight),
         "count": run.count,
         "longest": float(units.bare(longest, -1)),
@@ -145,35 +142,24 @@ def _bare_sensor(run: FitRun, units: Units) -> dict[str, Any] | None:
         "gravity": sensor.gravity,
         # A reading is the mean over a sampling interval.
         "interval": float(units.bare(float(np.median(np.diff(run.time))), -1)),
-        "angle": _floats("angle", sensor.angle),
+        "angle": np.ascontiguousarray(sensor.angle, np.float64),
     }
 
 
 def _bare_pivot(pivot: Pivot, rig: Rig, units: Units) -> dict[str, Any]:
     # Lengths are in units of g / w0^2, so that accelerations are in units of gravity.
     powers = {"acceleration": 0, "velocity": 1, "position": 2}
-    if pivot.quantity not in powers:
-        raise InputError(
-            f"quantity must be one of {', '.join(powers)}, got {short_repr(pivot.quantity)}"
-        )
     factor = units.w0 ** powers[pivot.quantity] / rig.gravity
 
     def bare(values: Floats | None) -> Floats | None:
-        return None if values is None else factor * _floats("pivot", values)
+        return None if values is None else factor * np.ascontiguousarray(values, np.float64)
 
     return {
         "quantity": pivot.quantity,
-        "time": units.bare(_floats("pivot time", pivot.time), -1),
+        "time": units.bare(np.ascontiguousarray(pivot.time, np.float64), -1),
         "vertical": bare(pivot.vertical),
         "horizontal": bare(pivot.horizontal),
     }
-
-
-def _floats(what: str, values: object) -> Floats:
-    array = np.ascontiguousarray(values, dtype=np.float64)
-    if array.ndim != 1:
-        raise InputError(f"{what} must have 1 dimension, got {array.ndim}")
-    return array
 
 
 def bare_windows(

@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats
 
 STATE: Final = 2  # Number of columns of an initial state
-
 FOLLOWED: Final = 1e-6
 """Norm after the projection, relative to before, below which a column is rounding, set to 0."""
 
@@ -144,15 +143,10 @@ def _basis(states: Floats) -> Floats:
 
 
 STAGES: Final = 8  # Most exponents tried
-
 REACH: Final = 0.2  # Initial longest step of an exponent, less than the spacing of the scan
-
 FARTHEST: Final = 3.0  # Largest change of the logarithm of a size in one step
-
 SHORTER: Final = 0.25  # New longest step, over a step that made the fit worse
-
 SHORTEST: Final = 0.01  # Longest step below which the search ends
-
 PROMISED: Final = 0.01  # Expected gain in the sum of squares below which the search ends
 
 

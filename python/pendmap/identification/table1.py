@@ -126,20 +126,16 @@ def simulated_peaks(rig: Rig, start: State, until: float) -> tuple[Floats, Float
     return times + start.time, angles
 
 
-def peak_errors(
-    identification: Identification, peaks: Peaks, start: State, *, offset: float | None = None
-) -> PeakErrors:
+def peak_errors(identification: Identification, peaks: Peaks, start: State) -> PeakErrors:
     """Return the errors of a model's simulation from ``start``, the first of ``peaks``.
 
-    The identified zero error is subtracted from the recorded ``start``. ``offset`` is the zero
-    error of ``peaks``, rad, if it differs.
+    The identified zero error is subtracted from the recorded ``start``.
     """
-    shown = identification.zero if offset is None else offset
     turned = peaks.turned
     origin = dataclasses.replace(start, theta=start.theta - identification.zero)
     span = float(turned.time[-1]) - start.time
     times, angles = simulated_peaks(identification.rig, origin, start.time + 1.2 * span + 5.0)
-    return errors_of(identification.method, peaks, times, angles + shown)
+    return errors_of(identification.method, peaks, times, angles + identification.zero)
 
 
 def errors_of(method: str, peaks: Peaks, times: Floats, angles: Floats) -> PeakErrors:

@@ -216,28 +216,10 @@ def swinging(time: Floats, theta: Floats) -> tuple[Floats, Floats]:
 
 def samples_per_period(time: Floats, theta: Floats) -> float:
     """Return the number of samples per period of small swings; infinite if no swing is seen."""
-    if theta.size < _FEWEST:
+    start = rough_start(time, theta, 0.0) if theta.size >= _FEWEST else None
+    if start is None:
         return math.inf
-    time, theta = swinging(time, theta)
-    w0 = _natural_frequency(time, theta)
-    if w0 is None:
-        return math.inf
-    # The median removes single spikes, but also fast swings, which lowers the frequency.
-    calm = _natural_frequency(time, median_filter(theta, 5, mode="nearest"))
-    if calm is not None and calm < 0.6 * w0:
-        return math.inf
-    return math.tau / (w0 * float(np.median(np.diff(time))))
-
-
-def _natural_frequency(time: Floats, theta: Floats) -> float | None:
-    """Return the natural frequency from the turning points of large swings, rad/s."""
-    if time.size < _FEWEST:
-        return None
-    turns = _zigzag(theta, 0.1 * float(np.ptp(theta)) + 1e-12)
-    if turns.size < 3:  # noqa: PLR2004 (two half swings)
-        return None
-    size = np.minimum(np.abs(np.diff(theta[turns])) / 2, 3.1)
-    return float(np.median(2 * ellipk(np.sin(size / 2) ** 2) / np.diff(time[turns])))
+    return math.tau / (start["w0"] * float(np.median(np.diff(time))))
 
 
 TURN_PARTS: Final = 12  # Parts of a turn whose mean speeds show the ripple by gravity

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
+from pendmap.formatting import Estimate
+from pendmap.signal.robust import Z95
+
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping, Sequence
 
     from pendmap.signal import Floats, Indices
 
@@ -33,6 +38,45 @@ def propagated(function: Callable[[Floats], Floats], values: Floats, stderr: Flo
     return np.asarray(slopes * stderr**2 @ slopes.T)
 
 
+def computed_from(
+    given: Mapping[str, Estimate],
+    joint: tuple[Sequence[str], Floats] | None,
+    quantities: Callable[[dict[str, float]], dict[str, float]],
+) -> dict[str, Estimate]:
+    """Return the finite quantities of estimates with errors by the delta method.
+
+    Without a ``joint`` covariance the estimates are independent. One that is held at the end of its
+    interval moves one end of the interval of what depends on it, which then has no standard error.
+    """
+    names = [*given]
+    values = np.array([e.value for e in given.values()])
+    errors = np.array([e.stderr or 0.0 for e in given.values()])
+
+    def computed(row: Floats) -> Floats:
+        return np.array([*quantities(dict(zip(names, row.tolist(), strict=True))).values()])
+
+    covariance = np.diag(errors**2)
+    if joint is not None:
+        table = pd.DataFrame(joint[1], [*joint[0]], [*joint[0]])
+        covariance = table.reindex(index=names, columns=names, fill_value=0.0).to_numpy()
+    with np.errstate(all="ignore"):
+        best, slopes = computed(values), jacobian(computed, values, errors / 10)
+        error = np.sqrt(np.diag(slopes @ covariance @ slopes.T))
+        down = up = Z95 * error
+        for k, e in enumerate(given.values()):
+            if e.stderr is None and e.ci95 is not None:
+                moved = computed(np.where(np.arange(len(names)) == k, e.ci95[1], values)) - best
+                down, up = down - np.minimum(moved, 0), up + np.maximum(moved, 0)
+    made = {}
+    for k, name in enumerate(quantities(dict(zip(names, values.tolist(), strict=True)))):
+        value, low, high = float(best[k]), float(best[k] - down[k]), float(best[k] + up[k])
+        known = low < high and math.isfinite(high - low)
+        stderr = float(error[k]) if known and down[k] == up[k] else None
+        if math.isfinite(value):
+            made[name] = Estimate(value, stderr, (low, high) if known else None)
+    return made
+
+
 def bootstrap(function: Callable[[Floats], Floats], values: Floats, stderr: Floats) -> Floats:
     """Return a function of normally distributed values, shape (1000, M); NaN where it fails.
 
@@ -50,12 +94,8 @@ def least_squares_line(x: Floats, y: Floats, stderr: Floats) -> tuple[Floats, Fl
 
     The misfit is chi^2 per degree of freedom; the covariance is multiplied by it if it is above 1.
     """
-    rows = np.column_stack((np.ones_like(x), x)) / stderr[:, None]
-    inverse = np.asarray(np.linalg.inv(rows.T @ rows), np.float64)
-    coefficients = inverse @ (rows.T @ (y / stderr))
-    residual = y / stderr - rows @ coefficients
-    misfit = float(residual @ residual) / max(x.size - 2, 1)
-    return coefficients, inverse * max(misfit, 1.0), misfit
+    rows = np.column_stack((np.ones_like(x), x))
+    return chain_least_squares(rows, y, np.stack((stderr**2, np.zeros(x.size))))
 
 
 def chain_covariance(pairs: Indices, left: Floats, right: Floats, variance: Floats) -> Floats:

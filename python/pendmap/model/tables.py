@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping
 from typing import Any, Final
 
@@ -12,7 +11,6 @@ from pendmap.errors import (
     check_number,
     check_whole,
     short_repr,
-    shown_key,
 )
 from pendmap.files import toml_text
 from pendmap.model import quantities
@@ -74,9 +72,8 @@ def check_notes(notes: object) -> None:
 
 def _is_si(table: dict[str, Any]) -> bool:
     """Return whether a table is in SI; check all its keys."""
-    for key in table:
-        if key not in SI_KEYS and key not in BARE_KEYS:
-            raise InputError(f"{shown_key(key)} is not known{_instead(key)}")
+    among = f"{', '.join(BARE_KEYS)}, or in SI {', '.join(SI_KEYS)}"
+    check_keys("", table, (*SI_KEYS, *BARE_KEYS), among)
     si = [key for key in table if key in _ONLY_SI]
     bare = [key for key in table if key in _ONLY_BARE]
     if si and bare:
@@ -85,14 +82,6 @@ def _is_si(table: dict[str, Any]) -> bool:
             f"{bare[0]} is {COUNTERPARTS[bare[0]][0]} in SI"
         )
     return bool(si)
-
-
-def _instead(key: str) -> str:
-    """Return the end of the message about an unknown key: the nearest key, and all keys."""
-    near = difflib.get_close_matches(key, (*SI_KEYS, *BARE_KEYS), n=1)
-    nearest = f", perhaps {near[0]} is meant" if near else ""
-    without = ", ".join(BARE_KEYS)
-    return f"{nearest}: it must be one of {without}, or in SI {', '.join(SI_KEYS)}"
 
 
 def _typed_over(table: dict[str, Any], typed: Mapping[str, float]) -> dict[str, Any]:

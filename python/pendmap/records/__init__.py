@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from pendmap.records.by_hand import ByHand
 from pendmap.records.experiment import Experiment, Run, Segment
 from pendmap.records.noise import NoiseFloor, noise_floor
-from pendmap.records.overrides import ByHand
 from pendmap.records.read import experiment_of, files_of, read_experiment
 from pendmap.tables.findings import Finding
 

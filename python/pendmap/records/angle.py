@@ -20,7 +20,7 @@ from pendmap.signal.robust import normal_scale
 if TYPE_CHECKING:
     from pendmap.records.rod_sensors import Accelerometer
     from pendmap.records.work import Work
-    from pendmap.signal import Floats
+    from pendmap.signal import Floats, Mask
     from pendmap.tables.findings import Finding
 
 WRAPPED_SPAN: Final = 1.01  # Greatest span of wrapped readings, turns: one turn and some noise
@@ -228,20 +228,13 @@ def _circle(u: Floats, v: Floats, basis: Floats) -> tuple[Floats, Floats, float,
     circle = np.array([radius, a, b, *np.zeros(basis.shape[1] - 1)])
     near = np.ones(u.size, bool)
 
-    def away(circle: Floats) -> Floats:
-        return np.asarray(np.hypot(u - circle[1], v - basis @ circle[2:]) - circle[0])
+    def away(circle: Floats, used: Mask) -> Floats:
+        return np.asarray(np.hypot(u - circle[1], v - basis @ circle[2:]) - circle[0])[used]
 
     for _ in range(2):
         inside = near
-        fit = least_squares(
-            lambda circle, used: away(circle)[used],
-            circle,
-            args=(inside,),
-            method="lm",
-            xtol=1e-14,
-            ftol=1e-14,
-        )
-        circle, every = fit.x, np.abs(away(fit.x))
+        fit = least_squares(away, circle, args=(inside,), method="lm", xtol=1e-14, ftol=1e-14)
+        circle, every = fit.x, np.abs(away(fit.x, np.ones(u.size, bool)))
         near = every <= 6 * max(normal_scale(every), 1e-9)
     # Sums over blocks of the record: neighbouring residuals need not be independent.
     blocks = np.linspace(0, fit.fun.size, min(BLOCKS, fit.fun.size) + 1).astype(int)[:-1]

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import difflib
-import math
-import re
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -14,7 +12,14 @@ from pendmap.formatting import listed
 from pendmap.model.quantities import GRAVITY
 from pendmap.records.by_hand import by_hand
 from pendmap.records.description import Column
-from pendmap.records.guesses import ANGLE_CHANNELS, changes, guess, head_of, use_pixels
+from pendmap.records.guesses import (
+    ANGLE_CHANNELS,
+    changes,
+    guess,
+    head_of,
+    in_order,
+    likely,
+)
 from pendmap.records.rod_sensors import accelerometer_of
 from pendmap.records.work import Work
 from pendmap.tables.findings import finding_of
@@ -23,10 +28,8 @@ from pendmap.tables.units import (
     CHANNELS,
     LENGTHS,
     PIVOT_UNITS,
-    RAW,
     Heading,
     name_and_unit,
-    plain,
     spelling,
 )
 
@@ -40,34 +43,14 @@ if TYPE_CHECKING:
 
 _MOST_NAMED: Final = 8  # Most columns listed in a message
 MOTOR_UNITS: Final = ("nm", "mnm", "a", "ma")
-# Default unit of a pivot's column by words in its name
-PIVOT_KINDS: Final = ((r"\bacc", "m/s2"), (r"\b(vel|speed)", "m/s"), (r"\b(pos|place|x)", "m"))
 MOST_UNUSED: Final = 12  # Most unused columns listed in a message
 
 
-def channels_of(  # noqa: C901 (a step each)
-    table: Table, description: Description, plan: RunPlan, where: str
-) -> Work:
+def channels_of(table: Table, description: Description, plan: RunPlan, where: str) -> Work:
     """Return a record's channels, from columns named in [columns], default or similar names."""
-    asked = description.columns
-    places: dict[str, int] = {}
-    for channel, column in asked.items():
-        name = column.name or CHANNELS[channel].default
-        # Without a name it gives unit, scale or zero of a column that is found by its usual names.
-        if column.name is not None or name in table.names:
-            places[channel] = _place(name, table, f"{where}: {channel}")
-    for channel, kind in CHANNELS.items():
-        if channel in places or kind.default not in table.names:
-            continue
-        place = table.names.index(kind.default)
-        # [columns] may say that theta_rad holds turning points: then it holds no angles.
-        if channel != "angle" or place != places.get("peaks"):
-            places[channel] = place
-    # A channel without a column is none that is looked for.
-    places |= {channel: -1 for channel, column in asked.items() if column.unused}
+    asked, places = description.columns, _named(table, description.columns, where)
     rate, known = description.rate_hz, description.known
-    findings = use_pixels(table, places, asked)
-    findings += guess(table, places, timed=rate is None)
+    findings = guess(table, places, timed=rate is None)
     places = {channel: place for channel, place in places.items() if place >= 0}
     if rate and "time" in places and not in_order(table.values[:, places["time"]]):
         del places["time"]
@@ -78,11 +61,10 @@ def channels_of(  # noqa: C901 (a step each)
         head = head_of(table, places["time"])
         findings.append(finding_of("rate-unused", column=head, rate=rate))
     _check(places, table, where, timed="time" in values)
+    _refuse_units(places, table, asked, where)
     for channel, place in places.items():
-        _refuse_text(table, place, places, f"{where}: {channel}")
-        column, counts = asked.get(channel, Column()), known.get("encoder_counts")
-        raw, head = table.values[:, place], table.names[place]
-        values[channel] = _in_si(channel, raw, head, column, counts, f"{where}: {channel}")
+        column = asked.get(channel, Column())
+        values[channel] = _in_si(channel, table, place, column, known, where)
         heads[channel] = head_of(table, place)
     pivot, pivot_unit, carried = _pivot(table, plan, where)
     if plan.kind == "forced" and not (plan.drive or plan.pivot):
@@ -111,7 +93,6 @@ def channels_of(  # noqa: C901 (a step each)
         findings=[*table.findings, *findings],
         columns=heads,
         unused=unused,
-        places=places,
         accelerometer=sensor,
         place_missing=missing,
         edge=asked.get("trigger", Column()).edge,
@@ -119,30 +100,53 @@ def channels_of(  # noqa: C901 (a step each)
     )
 
 
-def _refuse_text(table: Table, place: int, places: Mapping[str, int], where: str) -> None:
-    """Raise InputError for a column of text, with the command that takes another."""
-    if place not in table.texts:
-        return
-    taken, channel = {*places.values(), *table.texts}, where.rpartition(" ")[2]
-    free = [k + 1 for k in range(len(table.names)) if k not in taken]
-    file = where.rpartition(": ")[0]
-    more = f"; {by_hand(file, **{channel: free[0]})} takes another" if free else ""
-    head = f"column {place + 1} ({head_of(table, place)!r})"
-    raise InputError(f"{where}: {head} must be numbers, got {table.texts[place]}{more}")
+def _named(table: Table, asked: Mapping[str, Column], where: str) -> dict[str, int]:
+    """Return the columns named in [columns], and those with usual names."""
+    places: dict[str, int] = {}
+    for channel, column in asked.items():
+        name = column.name or CHANNELS[channel].default
+        # Without a name it gives unit, scale or zero of a column that is found by its usual names.
+        if column.name is not None or name in table.names:
+            places[channel] = _place(name, table, f"{where}: {channel}")
+    for channel, kind in CHANNELS.items():
+        place = table.names.index(kind.default) if kind.default in table.names else -1
+        # [columns] may say that theta_rad holds turning points: then it holds no angles.
+        if place >= 0 and place not in places.values() and changes(table.values[:, place]):
+            places.setdefault(channel, place)
+    # A channel without a column is none that is looked for.
+    return places | {channel: -1 for channel, column in asked.items() if column.unused}
 
 
 def _place(name: str | int, table: Table, where: str) -> int:
     """Return the index of a column by its number or its heading, with or without the unit."""
     if isinstance(name, int) and name <= len(table.names):
         return name - 1
-    if name in table.names:
-        return table.names.index(name)
-    bare = [name_and_unit(head)[0] for head in table.names]
-    if bare.count(str(name)) == 1:
-        return bare.index(str(name))
-    near = difflib.get_close_matches(str(name), table.names, 1, 0.6)
+    heads = [head_of(table, k) for k in range(len(table.names))]
+    for names in (heads, [name_and_unit(head)[0] for head in heads]):
+        if names.count(str(name)) == 1:
+            return names.index(str(name))
+    near = difflib.get_close_matches(str(name), heads, 1, 0.6)
     perhaps = f", perhaps {near[0]!r} is meant" if near else ""
     raise InputError(f"{where} must be one of {_names(table)}, got {short_repr(name)}{perhaps}")
+
+
+def _refuse_units(
+    places: Mapping[str, int], table: Table, asked: Mapping[str, Column], where: str
+) -> None:
+    """Raise InputError for a column of text, or for a unit that belongs to no column."""
+    for channel, place in places.items():
+        if place in table.texts:
+            others = {name: k for name, k in places.items() if name != channel}
+            raise InputError(
+                f"{where}: {channel}: column {place + 1} ({head_of(table, place)!r}) must be"
+                f" numbers, got {table.texts[place]}{_by_values(table, others, where)}"
+            )
+    for channel, column in asked.items():
+        if (column.unit or column.scale) and channel not in places:
+            more = _by_values(table, {}, where)
+            if "velocity" in places:
+                more = f": {by_hand(where, velocity=places['velocity'] + 1)}"
+            raise InputError(f"{where}: no column of {channel} has the unit that is given{more}")
 
 
 def _names(table: Table) -> str:
@@ -154,13 +158,8 @@ def _names(table: Table) -> str:
 def _check(places: dict[str, int], table: Table, where: str, *, timed: bool) -> None:
     """Raise InputError for a table without times or angles, or a column with two channels."""
     timed = timed or "time" in places
-    if not timed:
-        raise InputError(
-            f"{where}: no column of times: one, or the rate in Hz, must be given, got"
-            f" {_names(table)}: {_example(places, table, where, timed=timed)}"
-        )
-    if not any(channel in places for channel in ANGLE_CHANNELS):
-        raise InputError(f"{where}: no column of angles: {_missing_angle(table, places, where)}")
+    if not timed or not any(channel in places for channel in ANGLE_CHANNELS):
+        raise InputError(f"{where}: no column of {_missing(table, places, where, timed=timed)}")
     for one, other in (("time", "angle"), ("pixel_x", "pixel_y")):
         if one in places and places[one] == places.get(other):
             name = table.names[places[one]]
@@ -169,69 +168,62 @@ def _check(places: dict[str, int], table: Table, where: str, *, timed: bool) -> 
         raise InputError(f"{where}: both or neither of pixel_x and pixel_y must be given, got one")
 
 
-def _example(places: Mapping[str, int], table: Table, where: str, *, timed: bool) -> str:
-    """Return the command that reads the columns that are like times and angles."""
-    columns = range(len(table.names))
-    first = next((k for k in columns if in_order(table.values[:, k])), None)
-    time = places.get("time", None if timed else first)
-    free = [k for k in columns if k != time and changes(table.values[:, k])]
-    rough = {k: _roughness(table.values[:, k]) for k in free}
-    angle = next((k for k in free if rough[k] <= 2 * min(rough.values())), None)
-    headed = ("angle", "velocity") if any(table.names) else ()
-    known: dict[str, int | None] = {c: places[c] for c in headed if c in places}
-    given = {"time": time} | (known or {"angle": angle})
-    numbers = {channel: place + 1 for channel, place in given.items() if place is not None}
-    return by_hand(where, **({} if timed or "time" in numbers else {"rate_hz": 100}), **numbers)
-
-
-def _roughness(values: Floats) -> float:
-    """Return the mean second difference of numbers over their range; infinite if in order."""
-    good = values[np.isfinite(values)]
-    bend = np.abs(np.diff(good, 2))
-    return math.inf if in_order(values) or not bend.size else float(bend.mean() / np.ptp(good))
-
-
-def in_order(values: Floats) -> bool:
-    """Return whether numbers never fall, and rise."""
-    steps = np.diff(values[np.isfinite(values)])
-    return bool(np.any(steps > 0) and np.all(steps >= 0))
-
-
-def _missing_angle(table: Table, places: Mapping[str, int], where: str) -> str:
-    """Return what is no angle in a table, and the command that reads it all the same."""
-    free = [k for k in range(len(table.names)) if k not in places.values()]
-    for k, head in ((k, Heading.of(table.names[k])) for k in free):
-        unit = spelling(head.unit or "px")
-        if unit in LENGTHS and (head.unit or head.meaning in {"x", "y"}):
+def _missing(table: Table, places: Mapping[str, int], where: str, *, timed: bool) -> str:
+    """Return what misses in a table, and the command that reads it all the same."""
+    why, rate, options = "", dict[str, object](), dict[str, object]()
+    columns = likely(table, places, timed=not timed)
+    free = {*range(len(table.names))} - {*places.values(), *columns.values()}
+    if free and not any(channel in ANGLE_CHANNELS for channel in {**places, **columns}):
+        columns["angle"] = min(free)
+    if not timed:
+        columns |= {c: places[c] for c in ("angle", "velocity") if c in places}
+        rate = {} if "time" in columns else {"rate_hz": 100}
+    elif "angle" in columns:
+        heading = Heading.of(table.names[columns["angle"]])
+        unit = spelling(heading.unit or ("px" if heading.meaning in {"x", "y"} else ""))
+        if unit in LENGTHS:
             length = 400 if unit == "px" else 0.4 / LENGTHS[unit]
-            more = by_hand(where, angle=k + 1, angle_scale=f"{1 / length:.4g}")
-            return (
-                f"{table.names[k]!r} is a length: x and y must be given, or the distance from the"
-                f" pivot, as here of {length:g} {head.unit or 'px'}: {more}"
-            )
-        if head.unit is not None and {"angle", "velocity"} & {*head.meanings}:
-            more = by_hand(where, angle=k + 1, angle_unit="deg")
-            return f"{head.unit!r} is not known as a unit of {table.names[k]!r}: {more}"
-    more = _example(places, table, where, timed=True)
-    return f"one must be given, got {_names(table)}: {more}"
+            why = f", where a place is over its distance from the pivot, here {length:g} {unit}"
+            options = {"angle_scale": f"{1 / length:.4g}"}
+        elif heading.unit is not None:
+            why = f", where {heading.unit!r} is not known as a unit"
+            options = {"angle_unit": "deg"}
+    what = "angles: one" if timed else "times: one, or the rate in Hz,"
+    more = by_hand(where, **rate, **_numbers(columns), **options)
+    return f"{what} must be given, got {_names(table)}{why}: {more}"
+
+
+def _by_values(table: Table, places: Mapping[str, int], where: str) -> str:
+    """Return the end of a message: the command that takes the columns that are alike, if any."""
+    numbers = _numbers(likely(table, places, timed=True))
+    return f": {by_hand(where, **numbers)}" if numbers else ""
+
+
+def _numbers(columns: Mapping[str, int]) -> dict[str, int]:
+    """Return columns as keywords by hand with their numbers."""
+    return {channel.removeprefix("pixel_"): k + 1 for channel, k in columns.items()}
 
 
 def _in_si(  # noqa: PLR0913, PLR0917 (what is known of the column)
-    channel: str, raw: Floats, head: str, column: Column, counts: int | None, where: str
+    channel: str, table: Table, place: int, column: Column, known: Mapping[str, Any], where: str
 ) -> Floats:
     """Return the values of a column in SI, by its declared scale or its unit."""
-    if column.scale is not None:
-        return (raw - column.zero) * column.scale
+    head, raw = table.names[place], table.values[:, place] - column.zero
     unit = column.unit or name_and_unit(head)[1]
-    if unit is None:
-        return raw - column.zero
-    if counts and spelling(unit) == "counts":
-        return (raw - column.zero) * 2 * np.pi / counts
-    if spelling(unit) in RAW and channel in {"angle", "velocity"} and column.unit is None:
-        name, value = ("counts_per_turn", 2400) if "count" in spelling(unit) else ("angle_scale", 1)
-        more = by_hand(where.removesuffix(f": {channel}"), **{name: value})
-        raise InputError(f"{where}: the scale of {head!r} must be given, like {more}")
-    return (raw - column.zero) * CHANNELS[channel].factor(unit, where)
+    if column.scale is not None or unit is None:
+        return raw * (column.scale or 1.0)
+    counts = spelling(unit) == "counts"
+    if counts and "encoder_counts" in known:
+        return np.asarray(raw * 2 * np.pi / known["encoder_counts"])
+    if spelling(unit) in CHANNELS[channel].units:
+        return np.asarray(raw * CHANNELS[channel].units[spelling(unit)])
+    options: dict[str, dict[str, object]] = {
+        "time": {"time_unit": "ms"},
+        "angle": {"counts_per_turn": 2400} if counts else {"angle_scale": 1},
+        "velocity": {"velocity": place + 1, "angle_scale": 1},
+    }
+    more = f", like {by_hand(where, **options[channel])}" if channel in options else ""
+    raise InputError(f"{where}: {channel}: the unit or scale of {head!r} must be given{more}")
 
 
 def _pivot(
@@ -267,7 +259,7 @@ def _unused(
 
 def _suggestion(head: str, channels: Collection[str], plan: RunPlan) -> list[Finding]:
     """Return the finding that a heading suggests: a motor, an angle or a pivot."""
-    heading, words = Heading.of(head), plain(head)
+    heading = Heading.of(head)
     unit = spelling(heading.unit or "")
     driven = {"drive", "motor"} & {*heading.meanings} and "pivot" not in heading.meanings
     if (driven or unit in MOTOR_UNITS) and plan.kind == "free":
@@ -276,7 +268,6 @@ def _suggestion(head: str, channels: Collection[str], plan: RunPlan) -> list[Fin
     if bare and (heading.meaning in {"angle", "position"} or unit in ANGLES):
         return [finding_of("angle-column", head=head)]
     if "pivot" in heading.meanings and plan.pivot is None:
-        kind = next((u for pattern, u in PIVOT_KINDS if re.search(pattern, words)), "m")
-        unit = unit if unit in PIVOT_UNITS else kind
+        unit = unit if unit in PIVOT_UNITS else "m"
         return [finding_of("pivot-column", head=head, unit=unit)]
     return []

@@ -6,18 +6,16 @@ Each table of the file is a dataclass, each key one of its fields with a check.
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import math
-import re
 from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar
 
 from pendmap.errors import (
     InputError,
     check_flag,
+    check_keys,
     check_number,
     check_whole,
     short_repr,
-    shown_key,
 )
 from pendmap.tables.text import Reader
 from pendmap.tables.units import ANGULAR_ACCELERATIONS, CHANNELS, PIVOT_UNITS, spelling
@@ -33,7 +31,6 @@ NAME: Final = "experiment.toml"
 RATE: Final = "rate_hz"
 LARGEST: Final = 1e12  # Greatest magnitude of a number in a description
 NUMBER: Final = (-LARGEST, LARGEST)
-COUNTS: Final = re.compile("counts?|ticks?", re.IGNORECASE)
 COLUMN: Final = object()  # Rule of a heading, or of the number of a column from 1
 POSITIVE: Final = (1 / LARGEST, LARGEST)
 RATES: Final = (1e-3, 1e9)  # Sampling rates, Hz
@@ -103,7 +100,6 @@ class Pivot:
 EXAMPLES: Final[Mapping[type, str]] = {
     Drive: "drive = { p = 0.2, Omega = 12.1 }, of p = Y Omega^2/g and Omega = 2 pi f",
     Pivot: 'pivot = { vertical = "acc_y", unit = "m/s2" }',
-    Column: 'angle = { name = "...", unit = "..." }',
 }
 
 
@@ -134,27 +130,22 @@ class Description:
 
 def description_of(content: dict[str, Any]) -> Description:
     """Return the checked description from its tables; raise InputError for invalid ones."""
-    _refuse_unknown(
-        content, ("rig", "columns", "reader", "run"), "", "[rig], [columns], [reader] and [[run]]"
-    )
+    tables = "[rig], [columns], [reader] and [[run]]"
+    check_keys("", content, ("rig", "columns", "reader", "run"), tables)
     runs = content.get("run")
     if not isinstance(runs, list) or not runs:
         raise InputError('must have one [[run]] or more, each with file = "run_00.csv", got none')
     plans = tuple(_run(f"[[run]] {count}", table) for count, table in enumerate(runs, 1))
-    columns = _table("[columns]", content.get("columns", {}))
-    _refuse_unknown(columns, (*CHANNELS, RATE), "[columns]")
+    columns = {**_table("[columns]", content.get("columns", {}))}
+    check_keys("[columns]: ", columns, (*CHANNELS, RATE))
     rig = dataclasses.asdict(_parsed(Rig, "[rig]", content.get("rig", {})))
     counts = rig["encoder_counts"] is not None
-    reader = _reader(content.get("reader", {}))
+    rate = columns.pop(RATE, None)
     return Description(
         {name: value for name, value in rig.items() if value is not None},
-        {
-            name: _column(name, value, counts=counts)
-            for name, value in columns.items()
-            if name != RATE
-        },
-        checked(f"[columns]: {RATE}", columns[RATE], RATES) if RATE in columns else None,
-        reader,
+        {name: _column(name, value, counts=counts) for name, value in columns.items()},
+        None if rate is None else checked(f"[columns]: {RATE}", rate, RATES),
+        _reader(content.get("reader", {})),
         plans,
     )
 
@@ -166,28 +157,14 @@ def _table(where: str, value: object, example: str = "") -> dict[str, Any]:
     return value
 
 
-def _refuse_unknown(
-    table: Iterable[str], known: Iterable[str], where: str, among: str = ""
-) -> None:
-    """Raise InputError for unknown keys, with the nearest known one."""
-    by_lower = {key.lower(): key for key in known}
-    for key in set(table) - set(by_lower.values()):
-        near = difflib.get_close_matches(key.lower(), by_lower, 1, 0.55)
-        perhaps = f", perhaps {by_lower[near[0]]} is meant" if near else ""
-        place = f"{where}: " if where else ""
-        names = among or ", ".join(by_lower.values())
-        raise InputError(
-            f"{place}{shown_key(key)} is not known{perhaps}: it must be one of {names}"
-        )
-
-
 def _parsed(kind: type[T], where: str, value: object, without: Iterable[str] = ()) -> T:
     """Return a table as a dataclass, each of whose fields has a check."""
     example = f" like {EXAMPLES[kind]}" if kind in EXAMPLES else ""
     table = _table(where, value, example)
     every = dataclasses.fields(kind)  # type: ignore[arg-type]
     fields = {field.name: field for field in every if field.name not in without}
-    _refuse_unknown(table, fields, where, ", ".join(fields) + (example and f",{example}"))
+    names = ", ".join(fields) + (example and f",{example}")
+    check_keys(f"{where}: ", table, fields, names)
     for name, field in fields.items():
         if field.default is dataclasses.MISSING and name not in table:
             raise InputError(f"{where}: {name} must be given{example}")
@@ -223,14 +200,12 @@ def checked(name: str, value: object, rule: Any) -> Any:  # noqa: ANN401 (of any
 def _reader(value: object) -> Reader:
     """Return the checked ``[reader]``."""
     reader = _parsed(Reader, "[reader]", value)
-    delimiter = reader.delimiter
-    if delimiter is not None and (len(delimiter) != 1 or delimiter in '"\r\n\0+-.0123456789eE'):
+    taken = '"\r\n\0+-.0123456789eE' + (reader.decimal or "")
+    if reader.delimiter is not None and (len(reader.delimiter) != 1 or reader.delimiter in taken):
         raise InputError(
             "[reader]: delimiter must be one character that numbers do not need, like"
-            f' ";" or "\\t", got {short_repr(delimiter)}'
+            f' ";" or "\\t", got {short_repr(reader.delimiter)}'
         )
-    if delimiter is not None and delimiter == reader.decimal:
-        raise InputError(f"[reader]: delimiter and decimal must be two, got {delimiter!r} for both")
     return reader
 
 
@@ -244,7 +219,7 @@ def _column(channel: str, value: object, *, counts: bool) -> Column:
         raise InputError(f"{where}: scale must be any number but 0, got 0")
     if column.unit is None or column.scale is not None:
         return column
-    if counts and channel == "angle" and COUNTS.fullmatch(column.unit):
+    if counts and channel == "angle" and spelling(column.unit) == "counts":
         return column
     angular = spelling(column.unit) in ANGULAR_ACCELERATIONS
     if column.direction is not None and angular != (column.direction == "angular"):

@@ -190,18 +190,16 @@ class Experiment:
     runs : tuple of Run
         Runs in the order of the experiment.
     known : mapping
-        Content of ``[rig]``: ``gravity``, ``length_m``, ``w0``, ``encoder_counts``.
+        Content of ``[rig]``: ``gravity``, ``length_m``, ``w0``, ``encoder_counts``, and the body's
+        ``inertia`` about the pivot, kg m^2, ``mass``, kg, and ``length`` to its centre of mass, m.
     findings : tuple of Finding
         Findings about the experiment or a whole file with several releases.
-    sha256 : mapping of str to str
-        SHA-256 of each file that was read.
     """
 
     path: Path
     runs: tuple[Run, ...]
     known: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
-    sha256: Mapping[str, str] = dataclasses.field(default_factory=dict)
 
     def __iter__(self) -> Iterator[Run]:
         return iter(self.runs)
@@ -246,6 +244,11 @@ class Experiment:
             "findings": [", ".join(finding.what for finding in run.findings) for run in self],
         }
         return pd.DataFrame(columns).set_index("name")
+
+    @property
+    def sha256(self) -> dict[str, str]:
+        """SHA-256 of each file that was read."""
+        return {run.file: run.sha256 for run in self if run.sha256}
 
     @property
     def w0(self) -> float | None:

@@ -13,9 +13,8 @@ from pendmap.tables.findings import finding_of
 from pendmap.tables.units import CHANNELS, Heading, spelling
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
-    from pendmap.records.description import Column
     from pendmap.signal import Floats
     from pendmap.tables.findings import Finding
     from pendmap.tables.text import Table
@@ -25,49 +24,35 @@ ANGLE_CHANNELS: Final = ("angle", "velocity", "pixel_x", "pixel_y", "acceleratio
 POSITION_AGREES: Final = 0.9  # Least correlation of a position with the integrated velocity
 RISING: Final = 0.9  # Least share of rising steps of a clock
 DECAYED: Final = 0.9  # Greatest spread of a decayed last quarter, over that of the first
+LEAST_CROSSINGS: Final = 3  # Fewest crossings of the middle of what swings
+MOST_CROSSED: Final = 1 / 3  # Share of the steps of noise, half of which cross, that do in a swing
 ON_ARC: Final = 0.7  # Greatest distance from a circle, over that from a line, of places on an arc
 COPIED: Final = 0.9999  # Least correlation of the readings of a copy in another unit
 BY_UNIT: Final = 4  # Rank of a heading that fits by its unit alone
 UNNAMED: Final = 9  # Rank of a heading that says nothing
 
 
-def use_pixels(table: Table, places: dict[str, int], asked: Mapping[str, Column]) -> list[Finding]:
-    """Assign the pixel coordinates of a table whose angle column is constant."""
-    guessed = _by_name(table, {k: v for k, v in places.items() if k != "angle"}, timed=False)
-    place = places.get("angle", guessed.get("angle"))
-    both = guessed | places
-    pair: dict[str, int] = {c: both[c] for c in ("pixel_x", "pixel_y") if c in both}
-    if place is None or "angle" in asked or len(pair) < 2:
-        return []
-    if changes(table.values[:, place]) or not changes(table.values[:, pair["pixel_x"]]):
-        return []
-    places.pop("angle", None)
-    places.update(pair)
-    x, y = (table.names[k] for k in pair.values())
-    return [finding_of("angle-constant", angle=head_of(table, place), x=x, y=y)]
-
-
 def guess(table: Table, places: dict[str, int], *, timed: bool) -> list[Finding]:
-    """Assign missing channels by the words and units of headings, or by position without names."""
-    if not any(table.names):
-        return _by_position(table, places, timed=timed)
-    guessed = _by_name(table, places, timed=timed)
+    """Assign missing channels by the words and units of headings, or without names by values."""
+    by = _by_name if any(table.names) else likely
+    guessed = by(table, places, timed=timed)
     if "time" in places and any(channel in places for channel in ANGLE_CHANNELS):
         guessed = {c: k for c, k in guessed.items() if c in {"velocity", "trigger"}}
     # An angle given with pixel coordinates was computed from them.
-    pair = all(name in places or name in guessed for name in ("pixel_x", "pixel_y"))
-    if "angle" in places or "angle" in guessed or not pair:
-        guessed = {c: k for c, k in guessed.items() if not c.startswith("pixel")}
-    if "pixel_x" in places:
+    both = guessed | places
+    pair = "pixel_x" in both and "pixel_y" in both
+    moves = "angle" in both and changes(table.values[:, both["angle"]])
+    if "pixel_x" in places or (pair and not moves):
         guessed.pop("angle", None)
+    elif "angle" in both or not pair:
+        guessed = {c: k for c, k in guessed.items() if not c.startswith("pixel")}
     if not {"angle", "pixel_x", "peaks"} & {*places, *guessed}:
         position = position_of(table, places | guessed)
         guessed |= {} if position is None else {"angle": position}
     if not any(channel in places or channel in guessed for channel in ANGLE_CHANNELS):
-        others = _others(table, places | guessed, timed=timed)
-        guessed |= {"angle": _decaying(table, others)[0]} if others else {}
+        guessed |= _nameless_angle(table, places | guessed)
     places.update(guessed)
-    names = ", ".join(f"{channel} is {table.names[k]!r}" for channel, k in guessed.items())
+    names = ", ".join(f"{channel} is {head_of(table, k)!r}" for channel, k in guessed.items())
     return [finding_of("columns-guessed", names=names)] if guessed else []
 
 
@@ -103,22 +88,20 @@ def _fitting(table: Table, channel: str, heads: Mapping[int, Heading], *, timed:
     return [k for k in moving if ranks[k] == min(ranks[m] for m in moving)]
 
 
-def _nameless(head: Heading, *letters: str) -> bool:
+def _nameless(head: Heading, letters: str) -> bool:
     """Return whether a heading says nothing, as "value 1" or some letters."""
     return head.unit is None and head.meaning in {"", "plain", "smooth", *letters}
 
 
-def _others(table: Table, places: Mapping[str, int], *, timed: bool) -> list[int]:
-    """Return the columns of which one may be the angle where no heading says so."""
-    free = [k for k in range(table.values.shape[1]) if k not in places.values()]
-    if not timed and len(free) == 1:
-        return free
+def _nameless_angle(table: Table, places: Mapping[str, int]) -> dict[str, int]:
+    """Return the column that may be the angle where no heading says so: one alone, or a decay."""
     # Beside a column "X" of times "Y" is no place.
     clock = Heading.of(table.names[places["time"]]).meaning if "time" in places else ""
-    letters = "xy" if clock == "x" else ""
-    free = [k for k in free if _nameless(Heading.of(table.names[k]), *letters)]
-    free = [k for k in free if changes(table.values[:, k])]
-    return free if len(free) == 1 or any(decays(table.values[:, k]) for k in free) else []
+    free = [k for k in range(len(table.names)) if k not in places.values()]
+    free = [k for k in free if _nameless(Heading.of(table.names[k]), "xy" if clock == "x" else "")]
+    best = _swinging(table, free)
+    alone = len(best) == 1 or (best and decays(table.values[:, best[0]]))
+    return {"angle": best[0]} if alone else {}
 
 
 def decays(values: Floats) -> bool:
@@ -132,32 +115,51 @@ def _decaying(table: Table, columns: list[int]) -> list[int]:
     return [k for k in columns if decays(table.values[:, k])] or columns
 
 
-def rises(values: Floats, *, counters: bool = False) -> bool:
+def rises(values: Floats) -> bool:
     """Return whether a column rises nearly always, and not by 1 each time as a counter does."""
     steps = np.diff(values[np.isfinite(values)])
-    return bool(np.sum(steps > 0) > RISING * steps.size and (counters or np.any(steps != 1)))
+    return bool(np.sum(steps > 0) > RISING * steps.size and np.any(steps != 1))
 
 
-def _by_position(table: Table, places: dict[str, int], *, timed: bool) -> list[Finding]:
-    """Assign time and angle, or time and places on a circle, in a table without headings."""
-    free = [k for k in range(table.values.shape[1]) if k not in places.values()]
-    guesses = []
-    if not timed:  # the rate is known: ignore columns that number the readings
-        free = [k for k in free if np.any(np.diff(table.values[:, k]) != 1)]
-    rising = [k for k in free if rises(table.values[:, k], counters=True)]
-    if "time" not in places and rising:
-        k = places["time"] = next((k for k in rising if rises(table.values[:, k])), rising[0])
-        free.remove(k)
-        guesses.append(f"column {k + 1} is the time in s")
-    free = [k for k in free if changes(table.values[:, k])] or free
-    if free and not any(channel in places for channel in ANGLE_CHANNELS):
-        if len(free) > 1 and on_circle(*table.values[:, free[:2]].T):
-            places |= {"pixel_x": free[0], "pixel_y": free[1]}
-            guesses.append(f"columns {free[0] + 1} and {free[1] + 1} are x and y on a circle")
-        else:
-            places["angle"] = _decaying(table, free)[0]
-            guesses.append(f"column {places['angle'] + 1} is the angle")
-    return [finding_of("columns-guessed.places", names=", ".join(guesses))] if guesses else []
+def in_order(values: Floats) -> bool:
+    """Return whether numbers never fall, and rise."""
+    steps = np.diff(values[np.isfinite(values)])
+    return bool(np.any(steps > 0) and np.all(steps >= 0))
+
+
+def likely(table: Table, places: Mapping[str, int], *, timed: bool) -> dict[str, int]:
+    """Return by their values the columns of missing times, what is in order, and angles.
+
+    The angle swings smoothly from side to side; of several the first that decays is taken.
+    """
+    free = [k for k in range(len(table.names)) if k not in places.values()]
+    columns, taken = table.values.T, dict[str, int]()
+    ordered = [k for k in free if in_order(columns[k]) or rises(columns[k])]
+    if timed and "time" not in places and ordered:
+        taken["time"] = next((k for k in ordered if rises(columns[k])), ordered[0])
+    moving = [k for k in free if k not in ordered and changes(columns[k])]
+    swinging = _swinging(table, moving)
+    if swinging and not any(channel in places for channel in ANGLE_CHANNELS):
+        x = min(swinging)
+        y = next((k for k in moving if k != x and on_circle(columns[x], columns[k])), None)
+        taken |= {"angle": swinging[0]} if y is None else {"pixel_x": x, "pixel_y": y}
+    return taken
+
+
+def _swinging(table: Table, columns: Sequence[int]) -> list[int]:
+    """Return the columns that swing, or one that changes alone; those that decay first."""
+    moving = [k for k in columns if changes(table.values[:, k])]
+    if len(moving) > 1:
+        moving = [k for k in moving if swings(table.values[:, k])]
+    return sorted(moving, key=lambda k: not decays(table.values[:, k]))
+
+
+def swings(values: Floats) -> bool:
+    """Return whether a column goes from side to side of its middle, less often than noise does."""
+    away = values[np.isfinite(values)] - np.nanmedian(values)
+    wide = away[np.abs(away) > np.quantile(np.abs(away), 0.98) / 4]
+    crossings = np.count_nonzero(np.diff(wide > 0))
+    return bool(LEAST_CROSSINGS <= crossings < MOST_CROSSED * wide.size)
 
 
 def on_circle(x: Floats, y: Floats) -> bool:
@@ -185,9 +187,10 @@ def position_of(table: Table, places: Mapping[str, int]) -> int | None:
     both = both[np.isfinite(both).all(axis=1)]
     if both.shape[0] < 5:
         return None
-    one, other = detrend(both[:, 0]), detrend(np.cumsum(both[:, 1]))
-    size = float(np.linalg.norm(one) * np.linalg.norm(other))
-    return fitting[0] if size > 0 and float(one @ other) > POSITION_AGREES * size else None
+    both[:, 1] = np.cumsum(both[:, 1])
+    one, other = detrend(both, axis=0).T
+    alike = one @ other > POSITION_AGREES * np.linalg.norm(one) * np.linalg.norm(other)
+    return fitting[0] if alike else None
 
 
 def side_by_side(table: Table) -> list[Table]:
@@ -204,23 +207,25 @@ def side_by_side(table: Table) -> list[Table]:
     # The same readings in another unit are no further run.
     if all(abs(np.corrcoef(a[rows], b[rows])[0, 1]) > COPIED for a, b, rows in together):
         return [table]
-    taken = ("rows", "order")
+    taken, names = ("rows", "order"), table.names
     return [
         dataclasses.replace(
             table,
-            names=tuple(table.names[k] for k in block),
+            names=tuple(
+                names[k] if names.count(names[k]) == 1 else f"{names[k]} #{number}" for k in block
+            ),
             values=table.values[rows][:, block],
-            dated=(),
             texts={},
             **{name: getattr(table, name)[rows] for name in taken},
         )
-        for block, rows in zip(blocks, good, strict=True)
+        for number, (block, rows) in enumerate(zip(blocks, good, strict=True), 1)
     ]
 
 
 def head_of(table: Table, place: int) -> str:
-    """Return the heading of a column."""
-    return table.names[place] or f"column {place + 1}"
+    """Return the heading of a column; its number, if it has none or shares it."""
+    name = table.names[place]
+    return name if name and table.names.count(name) == 1 else f"column {place + 1}"
 
 
 def changes(values: Floats) -> bool:

@@ -13,12 +13,11 @@ from pendmap.errors import InputError, named, short_repr
 from pendmap.files import read_toml
 from pendmap.formatting import counted, listed
 from pendmap.records.across import checked_together
-from pendmap.records.by_hand import FRAME, GIVEN
+from pendmap.records.by_hand import FRAME, GIVEN, ByHand, by_keyword, name_columns, override
 from pendmap.records.channels import channels_of
 from pendmap.records.description import NAME, Description, RunPlan, description_of
 from pendmap.records.experiment import Experiment, Run
 from pendmap.records.guesses import side_by_side
-from pendmap.records.overrides import ByHand, by_option, name_columns, override, refuse_unused
 from pendmap.records.rod_sensors import gyroscope_of
 from pendmap.records.rules import OF_RELEASE, RULES, apply
 from pendmap.records.work import Work
@@ -34,7 +33,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike
 
-    from pendmap.records.overrides import Taken
     from pendmap.tables.text import Table
 
     Frame: TypeAlias = pd.DataFrame | pd.Series | xr.Dataset | xr.DataArray
@@ -124,7 +122,7 @@ def read_described(
     if unknown := by_hand.keys() - ByHand.__annotations__.keys():
         raise TypeError(f"got an unexpected keyword argument {unknown.pop()!r}")
     given = {name: value for name, value in by_hand.items() if value is not None}
-    frame, taken = frame_of(path, theta), dict[str, dict[str, str | int]]()
+    frame = frame_of(path, theta)
     if frame is not None:
         place, content = Path(FRAME), _free_decays([FRAME])
         given = given if theta is None else {"time": 1, "angle": 2} | given
@@ -135,23 +133,22 @@ def read_described(
         wanted = "a path, a table of pandas or xarray, or times with theta beside them"
         raise InputError(f"path must be {wanted}, got {short_repr(path)}")
     described = (place / NAME).is_file() and frame is None
-    GIVEN.set((str(place) if described else "", tuple(given.items())))
+    GIVEN.set((str(place) if described else "", given))
     planned = _described(place, content)
     if given:
         override(content, given)
         try:
             planned = description_of(content)
         except InputError as error:
-            raise InputError(by_option(str(error))) from None
+            raise InputError(by_keyword(str(error), given)) from None
     if frame is None:
-        runs, findings = _every(place, planned, taken)
+        runs, findings = _every(place, planned)
     else:
-        tables = {FRAME: (table_of(frame, FRAME), "")}
-        runs, findings = _runs(place, planned.runs[0], planned, tables, FRAME, taken)
-    digests = {run.file: run.sha256 for run in runs if run.sha256}
+        read = table_of(frame, FRAME), ""
+        runs, findings = _runs(read, planned.runs[0], planned, FRAME, FRAME)
     unique, together = checked_together(runs)
-    experiment = Experiment(place, unique, planned.known, (*findings, *together), digests)
-    name_columns(content, taken)
+    experiment = Experiment(place, unique, planned.known, (*findings, *together))
+    name_columns(content, runs)
     return experiment, content
 
 
@@ -175,23 +172,19 @@ def experiment_of(
         raise InputError(f"records must be {_FORMS}, got {short_repr(records)}")
     if len(parts) == 1:
         return parts[0]
-    known = dict(parts[0].known)
-    for part in parts[1:]:
-        for name, value in part.known.items():
-            if known.setdefault(name, value) != value:
-                raise InputError(
-                    f"{name} must be one for all records, got {known[name]} and {value}"
-                )
+    known = dict[str, Any]()
+    for name, value in (pair for part in parts for pair in part.known.items()):
+        if known.setdefault(name, value) != value:
+            raise InputError(f"{name} must be one for all records, got {known[name]} and {value}")
     runs, before = list[Run](), Counter[str]()
-    for run in (run for part in parts for run in part.runs):
+    for run in (run for part in parts for run in part):
         before[run.name] += 1
-        name = f"{run.name} ({before[run.name]})" if before[run.name] > 1 else run.name
-        runs.append(run if name == run.name else dataclasses.replace(run, name=name))
+        number = f" ({before[run.name]})" if before[run.name] > 1 else ""
+        runs.append(dataclasses.replace(run, name=run.name + number))
     unique, together = checked_together(runs)
     findings = dict.fromkeys([*(finding for part in parts for finding in part.findings), *together])
-    digests = {file: digest for part in parts for file, digest in part.sha256.items()}
     place = Path(listed([part.path.name for part in parts], _SHOWN))
-    return Experiment(place, unique, known, tuple(findings), digests)
+    return Experiment(place, unique, known, tuple(findings))
 
 
 def _experiment(records: object, by_hand: ByHand) -> Experiment:
@@ -205,8 +198,7 @@ def _experiment(records: object, by_hand: ByHand) -> Experiment:
             raise InputError(f"{name} must be left out where no file or table is read")
     if isinstance(records, Experiment):
         return records
-    digests = {records.file: records.sha256} if records.sha256 else {}
-    return Experiment(Path(records.file or records.name), (records,), sha256=digests)
+    return Experiment(Path(records.file or records.name), (records,))
 
 
 def _tables_of(place: Path) -> dict[str, Any]:
@@ -233,30 +225,28 @@ def _described(place: Path, content: dict[str, Any]) -> Description:
         return description_of(content)
 
 
-def _every(place: Path, description: Description, taken: Taken) -> tuple[list[Run], list[Finding]]:
+def _every(place: Path, description: Description) -> tuple[list[Run], list[Finding]]:
     """Read all runs; in a folder without a description, leave out files that are no records."""
-    plans, described = description.runs, (place / NAME).is_file()
+    described = (place / NAME).is_file()
     plain = place.is_dir() and not described
-    runs, findings, refused = list[Run](), list[Finding](), list[str]()
-    if plain:
-        findings.append(finding_of("no-description"))
+    runs, findings = list[Run](), [finding_of("no-description")] * plain
     tables: dict[str, tuple[Table, str]] = {}
-    for count, (plan, name) in enumerate(zip(plans, _names(plans), strict=True), 1):
+    refused = list[str]()
+    names = zip(description.runs, _names(description.runs), strict=True)
+    for count, (plan, name) in enumerate(names, 1):
         path = place / plan.file if place.is_dir() else place
         if described and not path.exists():
             raise InputError(f"{place / NAME}: [[run]] {count}: no file {plan.file!r}")
         try:
-            of_file, shared = _runs(
-                path, plan, description, tables if described else {}, name, taken
-            )
+            if plan.file not in tables:
+                tables = {plan.file: read_table(path, description.reader)}
+            of_file, shared = _runs(tables[plan.file], plan, description, str(path), name)
+            runs, findings = runs + of_file, findings + shared
         except InputError as error:
             if not plain:
                 raise
             refused.append(str(error))
             findings.append(finding_of("file-left-out", error=error))
-        else:
-            runs += of_file
-            findings += shared
     if not runs:
         got = f"{counted(len(refused), 'file')}, the first refused: {refused[0]}"
         raise InputError(_NO_RECORD.format(place=place, got=got))
@@ -276,24 +266,15 @@ def _names(plans: Sequence[RunPlan]) -> list[str]:
     return names
 
 
-def _runs(  # noqa: PLR0913, PLR0917 (what is known of the file)
-    path: Path,
-    plan: RunPlan,
-    description: Description,
-    tables: dict[str, tuple[Table, str]],
-    name: str,
-    taken: Taken,
+def _runs(
+    read: tuple[Table, str], plan: RunPlan, description: Description, where: str, name: str
 ) -> tuple[list[Run], list[Finding]]:
     """Return the runs of a file, one per release, and the findings that belong to none."""
-    if plan.file not in tables:
-        tables[plan.file] = read_table(path, description.reader)
-    table, digest = tables[plan.file]
+    table, digest = read
     named = any(column.name for column in description.columns.values())
     parts, shared = list[Work](), list[Finding]()
-    blocks = [table] if named else side_by_side(table)
-    for beside in blocks:
-        work = channels_of(beside, description, plan, str(path))
-        refuse_unused(work)
+    for beside in [table] if named else side_by_side(table):
+        work = channels_of(beside, description, plan, where)
         apply(RULES, work)
         releases, others = work.split_by_release()
         parts += releases
@@ -302,10 +283,6 @@ def _runs(  # noqa: PLR0913, PLR0917 (what is known of the file)
     for k, part in enumerate(parts, 1):
         apply(OF_RELEASE, part)
         runs.append(_run(part, f"{name} {k}/{len(parts)}" if len(parts) > 1 else name, digest))
-    places = work.places if len(blocks) == 1 else {}
-    heads = {channel: table.names[place] for channel, place in places.items()}
-    alone = {head for head in heads.values() if head and table.names.count(head) == 1}
-    taken[plan.file] = {c: h if h in alone else places[c] + 1 for c, h in heads.items()}
     return runs, [dataclasses.replace(finding, where=finding.where or name) for finding in shared]
 
 

@@ -78,9 +78,15 @@ class Periods:
 
 def swings_of(run: Run) -> Periods | None:
     """Return the periods of a free run; None if too few are below half a turn."""
-    time, theta = run.time[run.trusted], run.theta[run.trusted]
-    periods = periods_of(time, theta - (middle_of(time, theta) or 0.0), run.count_rad)
+    periods = swings_about(run.time[run.trusted], run.theta[run.trusted], run.count_rad)
     return None if periods is None or float(periods.amplitude.min()) >= math.pi else periods
+
+
+def swings_about(time: Floats, theta: Floats, count: float) -> Periods | None:
+    """Return the periods of readings about their middle; None if there are too few."""
+    middle = middle_of(time, theta)
+    middle = float(np.median(theta[theta.size // 2 :])) if middle is None else middle
+    return periods_of(time, theta - middle, count)
 
 
 def periods_of(time: Floats, theta: Floats, count: float) -> Periods | None:
@@ -117,7 +123,7 @@ def share_of(periods: Periods, grown: Floats) -> tuple[float, float]:
 
 def gain_of(time: Floats, theta: Floats, count: float) -> tuple[float, float] | None:
     """Return the 95 % interval of reading over angle from the periods of a free run, or None."""
-    periods = periods_of(time, theta - (middle_of(time, theta) or 0.0), count)
+    periods = swings_about(time, theta, count)
     if periods is None or float(np.max(periods.amplitude)) > LARGEST_SWING:
         return None
     return gain_interval(periods)
@@ -155,11 +161,10 @@ def factor_of(periods: Periods, share: float) -> tuple[float, float]:
 
 
 def growth(amplitude: Floats) -> Floats:
-    """Return T(A)/T0, computed by the arithmetic-geometric mean."""
-    a, b = np.ones_like(amplitude), np.abs(np.cos(amplitude / 2))
-    for _ in range(8):
-        a, b = (a + b) / 2, np.sqrt(a * b)
-    return np.asarray(1 / a)
+    """Return T(A)/T0 = (2/pi) K(sin(A/2))."""
+    from scipy.special import ellipkm1
+
+    return np.asarray(2 / math.pi * ellipkm1(np.cos(amplitude / 2) ** 2))
 
 
 def _robust_line(columns: Floats, values: Floats) -> tuple[Floats, Floats]:
@@ -185,12 +190,10 @@ def seconds(work: Work) -> Finding | None:
             continue
         if "time" in work.declared:
             return work.finding("time-unit.declared", period=small, unit=name)
-        span = {"from_s": work.plan.from_s, "to_s": work.plan.to_s}
-        span = {name: time for name, time in span.items() if math.isfinite(time)}
-        if span:
+        if math.isfinite(work.plan.from_s) or math.isfinite(work.plan.to_s):
             raise InputError(
-                f"{work.where}: {' and '.join(span)} must be in s, the times look like {name}:"
-                f" {by_hand(work.where, time_unit=name, **span)}"
+                f"{work.where}: from_s and to_s must be in s, the times look like {name}:"
+                f" {by_hand(work.where, time_unit=name)}"
             )
         finding = work.finding("time-unit.short", period=small, unit=name)
         work.time *= factor
@@ -201,13 +204,8 @@ def seconds(work: Work) -> Finding | None:
 
 def _periods(work: Work) -> Periods | None:
     """Return the periods of a free record before its scale is certain."""
-    if not work.free:
-        return None
     time, theta = work.time[work.trusted], work.theta[work.trusted]
-    middle = middle_of(time, theta)
-    if middle is None:
-        middle = float(np.median(work.theta[work.theta.size // 2 :]))
-    return periods_of(time, theta - middle, work.count)
+    return swings_about(time, theta, work.count) if work.free else None
 
 
 def radians(work: Work) -> Finding | None:
@@ -239,11 +237,10 @@ def one_sided(work: Work) -> None:
         return
     less, more = sorted(np.abs(ends[1] - ends[0]).tolist())
     if less < ONE_SIDED * more and more > ONE_SIDED * float(np.ptp(work.theta)):
-        others = f": {by_hand(work.where, angle=work.unused[0])}" if work.unused else ""
         raise InputError(
             f"{work.where}: angles must swing to both sides of the rest, and the decay of"
             f" {work.columns.get('angle')!r} is on one side of it, as of a cosine, a height or an"
-            f" absolute value: another column must be the angle{others}"
+            f" absolute value: another column must be the angle{work.other('angle')}"
         )
 
 
@@ -322,8 +319,6 @@ def zero(work: Work) -> Finding | None:
     gauge = quarters * math.pi / 2
     if not _certain(work.time[good], work.theta[good] - middle):
         return work.finding("zero-uncertain")
-    if "angle" in work.declared and abs(off) < math.pi / 2 - OFF_QUARTER:
-        return work.finding("zero-offset.given", middle=off)
     turned = quarters and abs(off - gauge) < OFF_QUARTER
     work.zero = turns + (gauge if turned else off)
     work.theta -= work.zero

@@ -56,7 +56,6 @@ class Work:
     findings: list[Finding]
     columns: Mapping[str, str]  # heading of each channel
     unused: tuple[str, ...]  # headings of columns without a channel
-    places: Mapping[str, int]  # index of the column of each channel
     segments: list[Segment] = dataclasses.field(default_factory=list)
     count: float = 0.0  # step of the readings, declared or estimated, rad; 0 for none
     estimated_step: float = 0.0  # step estimated from the readings, rad; 0 for none
@@ -164,10 +163,7 @@ class Work:
 
     def other(self, option: str) -> str:
         """Return the end of a message: the command that reads another column, if there is one."""
-        if not self.unused:
-            return ""
-        number = self.unused[0].removeprefix("column ")
-        return f": {by_hand(self.where, **{option: number})}"
+        return f": {by_hand(self.where, **{option: self.unused[0]})}" if self.unused else ""
 
     def refuse_short(self) -> None:
         """Raise InputError if there are too few samples for a record."""

@@ -74,11 +74,10 @@ def parameters_by_run(
         for place, name in enumerate(slopes.names):
             own_information = float(information[place, place])
             value = fit.estimates[name].value
-            if own_information <= BLIND:
-                wanted[name].append((value, math.inf))
-                continue
-            step = float(pull[place]) / own_information / sizes[place]
-            error = math.sqrt(level / own_information) / sizes[place]
+            step, error = 0.0, math.inf
+            if own_information > BLIND:
+                step = float(pull[place]) / own_information / sizes[place]
+                error = math.sqrt(level / own_information) / sizes[place]
             wanted[name].append((value + step, error))
     degrees = max(degrees, 0)
     uneven = (q / noise.level - degrees) / math.sqrt(2 * degrees) if degrees else 0.0

@@ -114,13 +114,13 @@ def calm_responses(
 
 def instants(responses: Sequence[Response]) -> list[float]:
     """Return the laboratory time, s, of the impulse with the greatest gain in each tenth."""
-    time, gain = [], []
+    gain = []
     for response in responses:
         pull, information = response.pull(response.residual), response.information()
         score = np.divide(pull**2, information, out=np.zeros_like(pull), where=information > 0)
-        time.append(response.time)
         gain.append(score)
-    parts = zip(*(np.array_split(np.concatenate(x), PARTS) for x in (time, gain)), strict=True)
+    both = np.concatenate([response.time for response in responses]), np.concatenate(gain)
+    parts = zip(*(np.array_split(x, PARTS) for x in both), strict=True)
     return [float(of[np.argmax(score)]) for of, score in parts if score.size]
 
 

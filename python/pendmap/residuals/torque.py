@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from pendmap.identification.runs import FitRun
     from pendmap.identification.sensitivity import WindowSlopes
     from pendmap.residuals.noise import ResidualNoise
-    from pendmap.signal import Floats, Indices
+    from pendmap.signal import Floats
 
 
 OVER: Final = {
@@ -47,6 +47,7 @@ OVER: Final = {
 """Quantities against which the torque is computed, with their units."""
 ALONG: Final = ("amplitude", "lab_time")
 """Quantities with the torque along the motion, positive if it adds energy."""
+ROW: Final = ("from", "to", "torque", "stderr")  # Keys of the numbers of a bin
 BINS: Final = 10  # Number of bins of a quantity, with equally many samples each
 STANDS_OUT: Final = 4.0  # Standard errors above which a bin is significant; 0.3 % for fifty bins
 BLIND: Final = 1e-5
@@ -86,10 +87,9 @@ def residual_torque(runs: Sequence[FitRun], fit: TrajectoryFit, noise: ResidualN
             edge = np.unique(np.nanquantile(values, np.linspace(0, 1, BINS + 1)))
             if edge.size > 2:  # noqa: PLR2004 (two bins at least)
                 edges[name] = edge
-    columns = [
-        responses(runs[window.run], window, _binned(place, edges))
-        for window, place in zip(windows, places, strict=True)
-    ]
+    binned = [_binned(place, edges) for place in places]
+    columns = [responses(runs[w.run], w, bins) for w, bins in zip(windows, binned, strict=True)]
+    drag = any(effect.name == DRAG for effect in fit.model.effects)
     further, residual = project_out(runs, windows, columns)
     rows: dict[str, list[dict[str, Any]]] = {name: [] for name in OVER}
     gains: dict[str, tuple[float, int]] = {}
@@ -98,27 +98,18 @@ def residual_torque(runs: Sequence[FitRun], fit: TrajectoryFit, noise: ResidualN
     power = dct(residual - further @ torques, norm="ortho") ** 2
     level = float(np.sum(power**2)) / (3 * float(power.sum())) if power.any() else 0.0
     covariance *= max(noise.level, level)
-    drag, first = any(effect.name == DRAG for effect in fit.model.effects), 0
+    every, first = np.concatenate(binned), 0
     for name, edge in edges.items():
         lows, highs = edge[:-1], edge[1:]
         part = slice(first, first + lows.size)
         gains[name] = _solved(further[:, part], residual)[2]
-        rest = _without_own(name, edge, places, drag=drag)
+        rest = _without_own(name, every[:, part], places, drag=drag)
         errors = np.sqrt(np.maximum(np.diag(rest @ covariance[part, part] @ rest), 0.0))
-        columns_of = (lows, highs, rest @ torques[part], errors)
-        rows[name] = [
-            {
-                "over": name,
-                "unit": OVER[name],
-                "along_motion": name in ALONG,
-                "from": low,
-                "to": high,
-                "torque": torque,
-                "stderr": error,
-                "z": torque / error if error > 0 else 0.0,
-            }
-            for low, high, torque, error in np.stack(columns_of, axis=1).tolist()
-        ]
+        values = np.stack((lows, highs, rest @ torques[part], errors), axis=1).tolist()
+        about: dict[str, Any] = {"over": name, "unit": OVER[name], "along_motion": name in ALONG}
+        for ends_and_torque in values:
+            row = about | dict(zip(ROW, ends_and_torque, strict=True))
+            rows[name].append(row | {"z": row["torque"] / row["stderr"] if row["stderr"] else 0.0})
         first = part.stop
     return Torque(noise, rows, gains)
 
@@ -176,33 +167,23 @@ def _places(run: FitRun, fit: TrajectoryFit, window: WindowSlopes) -> dict[str, 
     }
 
 
-def _bins(values: Floats, edge: Floats) -> Indices:
-    """Return the number of the bin of each value."""
-    return np.clip(np.searchsorted(edge, values, side="right") - 1, 0, edge.size - 2)
-
-
 def _without_own(
-    name: str, edge: Floats, places: Sequence[dict[str, Floats]], *, drag: bool
+    name: str, bins: Floats, places: Sequence[dict[str, Floats]], *, drag: bool
 ) -> Floats:
     """Return the projector of a quantity's bins that takes out the model's own terms.
 
-    They are means in the bins: of ``sin`` and ``cos`` over the angle (``w0``, the sensor's zero);
-    of ``v``, ``sign v``, with ``drag`` of ``v |v|``, over the velocity, and along the motion over
-    amplitude and time; a constant over the drive's phase.
+    They are means in the bins: of ``sin`` and ``cos`` over the angle (``w0``, the sensor's zero), a
+    constant over the drive's phase, and else ``v``, ``sign v``, with ``drag`` also ``v |v|``.
     """
-    place = {key: np.concatenate([one[key] for one in places]) for key in places[0]}
-    known = np.isfinite(place[name])
-    speed, angle = place["velocity"][known], place["angle"][known]
+    speed, angle = (np.concatenate([one[key] for one in places]) for key in ("velocity", "angle"))
     terms = [speed, np.sign(speed), *([speed * np.abs(speed)] if drag else [])]
-    if name in ALONG:
-        terms = [np.sign(speed) * term for term in terms]
-    elif name != "velocity":
-        terms = [np.sin(angle), np.cos(angle)] if name == "angle" else [np.ones(speed.size)]
-    which, count = _bins(place[name][known], edge), edge.size - 1
-    number = np.maximum(np.bincount(which, minlength=count), 1)
-    means = np.stack([np.bincount(which, term, count) / number for term in terms], axis=1)
+    if name == "angle":
+        terms = [np.sin(angle), np.cos(angle)]
+    elif name == "drive_phase":
+        terms = [np.ones(speed.size)]
+    means = bins.T @ np.stack(terms, axis=1) / np.maximum(np.sum(bins**2, axis=0), 1.0)[:, None]
     means /= np.maximum(np.linalg.norm(means, axis=0), 1e-300)
-    rest = np.eye(count) - means @ np.linalg.pinv(means)
+    rest = np.eye(len(means)) - means @ np.linalg.pinv(means)
     return np.where(np.abs(rest) < ROUNDING, 0.0, rest)
 
 
@@ -210,7 +191,7 @@ def _binned(place: dict[str, Floats], edges: dict[str, Floats]) -> Floats:
     """Return a column for each bin with a torque of 1 rad/s^2 in it."""
     torques = []
     for name, edge in edges.items():
-        which = _bins(place[name], edge)
+        which = np.clip(np.searchsorted(edge, place[name], side="right") - 1, 0, edge.size - 2)
         weight = np.sign(place["velocity"]) if name in ALONG else np.ones(which.size)
         weight = np.where(np.isfinite(place[name]), weight, 0.0)
         torques += [np.where(which == k, weight, 0.0) for k in range(edge.size - 1)]

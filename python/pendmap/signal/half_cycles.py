@@ -51,13 +51,10 @@ def after_turns(theta: Floats) -> int:
 
 def swings(time: Floats, theta: Floats, *, least: float = 0.0) -> Swings:
     """Return the half cycles of a record about 0 that exceed ``least``."""
-    none = np.empty(0)
     # Sign of the angle outside the dead band, 0 inside.
     band = max(least, DEAD_BAND * float(np.quantile(np.abs(theta), 0.5)) if theta.size else 0.0)
     state = np.where(theta > band, 1, np.where(theta < -band, -1, 0))
     seen = np.flatnonzero(state)
-    if seen.size == 0:
-        return Swings(none, none, none)
     signs = state[seen]
     turns = np.flatnonzero(signs[1:] != signs[:-1])
     before, after = seen[turns], seen[turns + 1]

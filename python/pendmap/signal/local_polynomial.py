@@ -143,8 +143,6 @@ class WindowFit:
     half: float  # half width of the window, s
     coefficients: Floats  # rad, shape (degree + 1,)
     covariance: Floats  # of the coefficients for noise of unit variance
-    points: int  # samples used
-    residual: float  # root of the squared residuals over the degrees of freedom, rad
 
     def at(self, time: float, derivative: int = 0) -> tuple[float, float]:
         """Return a derivative and its standard error for unit noise, in rad/s^derivative."""
@@ -198,10 +196,7 @@ def fit_around(  # noqa: PLR0913 (samples, window, form)
     every, square = np.zeros(max(powers) + 1), np.zeros((max(powers) + 1,) * 2)
     every[list(powers)] = coefficients
     square[np.ix_(powers, powers)] = inverse
-    freedom = x.size - len(powers)
-    return WindowFit(
-        centre, half, every, square, x.size, math.sqrt(float(residual @ residual) / freedom)
-    )
+    return WindowFit(centre, half, every, square)
 
 
 def _solve(rows: Floats, x: Floats) -> tuple[Floats, Floats, Floats]:
@@ -217,20 +212,17 @@ def smoothed_velocity(time: Floats, theta: Floats, half: float) -> tuple[Floats,
 
     Windows reach ``half`` (s) to both sides, and more where they have too few samples.
     """
+    from scipy.signal import savgol_coeffs, savgol_filter  # noqa: PLC0415 (slow to import)
+
     step = float(np.median(np.diff(time)))
     reach = max(round(half / step), _DEGREE // 2 + 2)
     width = 2 * reach + 1
     if time.size < width:
         raise ValueError(f"{time.size} samples are fewer than a window of {width}")
-    scale = half if half > 0 else 1.0
-    slope, stderr = np.empty(time.size), np.empty(time.size)
     # One set of weights serves all windows of evenly spaced samples.
-    lags = np.arange(-reach, reach + 1) * (step / scale)
-    rows = lags[:, None] ** np.arange(_DEGREE + 1)
-    normal = np.asarray(np.linalg.inv(rows.T @ rows), np.float64)
-    inside = slice(reach, time.size - reach)
-    slope[inside] = np.correlate(theta, rows @ normal[1], "valid") / scale
-    stderr[inside] = math.sqrt(normal[1, 1]) / scale
+    slope = savgol_filter(theta, width, _DEGREE, deriv=1, delta=step)
+    weights = savgol_coeffs(width, _DEGREE, deriv=1, delta=step)
+    stderr = np.full(time.size, np.linalg.norm(weights))
     apart = np.append(np.abs(np.diff(time) / step - 1.0) > _EVEN, False)
     uneven = widened(apart, reach)
     uneven[:reach] = uneven[-reach:] = True

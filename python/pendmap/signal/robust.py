@@ -7,6 +7,7 @@ import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -51,10 +52,7 @@ def stretches(mask: Mask) -> list[Stretch]:
 
 def widened(mask: Mask, reach: int) -> Mask:
     """Return the mask of indices within ``reach`` of a marked one."""
-    sums = np.concatenate([[0], np.cumsum(mask)])
-    place = np.arange(mask.size)
-    low, high = np.maximum(place - reach, 0), np.minimum(place + reach + 1, mask.size)
-    return np.asarray(sums[high] > sums[low], bool)
+    return np.asarray(maximum_filter1d(mask.view(np.uint8), 2 * reach + 1, mode="constant") > 0)
 
 
 def between(stretches: list[Stretch], low: int, high: int) -> list[Stretch]:

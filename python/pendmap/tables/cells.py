@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import csv
 import dataclasses
-import datetime as dt
 import re
-from collections import Counter
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     import pandas as pd
 
     from pendmap.signal import Floats, Indices, Mask
@@ -25,15 +21,11 @@ _NOTHING: Final = frozenset(
     )
 )
 # Words that loggers write for the levels of a trigger
-_LEVELS: Final = {
-    **dict.fromkeys(("true", "high", "on"), 1.0),
-    **dict.fromkeys(("false", "low", "off"), 0.0),
-}
+_LEVELS: Final = {"true": 1.0, "high": 1.0, "on": 1.0, "false": 0.0, "low": 0.0, "off": 0.0}
 _PLAIN: Final = {
     ".": r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eEdD][+-]?[0-9]+)?",
     ",": r"[+-]?(?:[0-9]+(?:,[0-9]+)?|,[0-9]+)(?:[eEdD][+-]?[0-9]+)?",
 }
-_OTHER: Final = {".": ",", ",": r"\."}
 _NUMBER: Final = {sign: re.compile(plain) for sign, plain in _PLAIN.items()}
 # A number between a label and a unit, as in "t = 0.04 s"
 _LABELLED: Final = {
@@ -46,33 +38,25 @@ _LABELLED: Final = {
 # A number with its thousands set apart
 _GROUPED: Final = {
     sign: re.compile(
-        rf"[+-]?[1-9][0-9]{{0,2}}(?:(?P<set>{_OTHER[sign]}|[' ])[0-9]{{3}})"
-        rf"(?:(?P=set)[0-9]{{3}})*(?P<rest>{re.escape(sign)}[0-9]*)?"
+        rf"[+-]?[1-9][0-9]{{0,2}}(?P<set>[{other}' ])[0-9]{{3}}"
+        rf"(?:(?P=set)[0-9]{{3}})*(?P<rest>[{sign}][0-9]*)?"
     )
-    for sign in _PLAIN
+    for sign, other in (".,", ",.")
 }
 _DOUBT: Final = 0.9  # Weight of a number like 1,234, which may be 1.234
 _DAY: Final = (
     r"\d{4}[-./]\d{1,2}[-./]\d{1,2}|\d{1,2}[-./]\d{1,2}[-./](?:\d{4}|\d\d)"
-    r"|\d{1,2}[-./ ]{1,2}[^\W\d_]{3,9}[-./, ]{1,2}\d{4}|[^\W\d_]{3,9}\.? \d{1,2},? \d{4}"
+    r"|\d{1,2}[-./ ]{1,2}[A-Za-z]{3,9}[-., ]{1,2}\d{4}|[A-Za-z]{3,9}\.? \d{1,2},? \d{4}|20\d{6}"
 )
-# Groups: day, hour, minute, second, fraction, ms, a or p, zone, day behind
 _CLOCK: Final = re.compile(
-    rf"({_DAY})?(?:(?:^|(?<=\d)[T ,_]+)(\d{{1,3}}):(\d\d)(?::(\d\d))?(?:[.,](\d+)|:(\d{{3}}))?"
-    r"(?: ?([AaPp])\.?[Mm]\.?)? ?(Z|UTC|[+-]\d\d(?::?\d\d)?)?)?"
-    rf"(?:(?<=[\dMm.])[ ,]+({_DAY}))?"
+    rf"(?P<day>{_DAY})?(?:(?:^|(?<=\d)[T ,_]+)(?P<clock>(?:\d{{1,3}}:)?\d{{1,3}}:\d\d)"
+    r"(?:[.,](?P<point>\d+)|:(?P<ms>\d{3}))?(?: ?(?P<half>[AaPp])\.?[Mm]\.?)?"
+    r" ?(?P<zone>Z|UTC|[+-]\d\d(?::?\d\d)?)?)?"
 )
-# Beginnings of the months in English, German, French, Spanish, Portuguese, Italian, Polish, Dutch
-_MONTHS: Final = (
-    *("jan gen ene sty", "feb fév lut", "mar mär mrt", "apr avr abr kwi", "may mai maj mag mei"),
-    *("jun juin giu cze", "jul juil lug lip", "aug aoû ago sie", "sep set wrz"),
-    *("oct okt out ott paź", "nov lis", "dec dez déc dic gru"),
-)
-_MONTH: Final = {word: k for k, words in enumerate(_MONTHS, 1) for word in words.split()}
 _DAY_S: Final = 86_400
-# Counts since 1904 or 1970 in ms, us, ns, in days since 1900 (Excel) or the year 0: range, unit
+# Counts since 1904 or 1970 in s, ms, us, ns, in days since 1900 (Excel) or the year 0: range, unit
 _SINCE: Final = (
-    *((9.4e8 * k, 4.3e9 * k, 1 / k) for k in (1e3, 1e6, 1e9)),
+    *((9.4e8 * k, 4.3e9 * k, 1 / k) for k in (1, 1e3, 1e6, 1e9)),
     *((3.6e4, 5.2e4, _DAY_S), (7.3e5, 7.5e5, _DAY_S)),
 )
 _LONGEST_STEP: Final = 0.9  # Longest usual interval of a record, s: counters of ms have 1 and more
@@ -90,7 +74,6 @@ class Column:
     label: str = ""  # text before each number
     unit: str = ""  # text behind each number
     parts: str = ""  # of a clock: day, time
-    wrap: int = 0  # s after which a clock begins again
 
     def at(self, rows: Indices) -> Column:
         """Return the column at some rows."""
@@ -98,7 +81,8 @@ class Column:
 
 
 def split(line: str, delimiter: str) -> list[str]:
-    """Return the cells of a line."""
+    """Return the cells of a line; the Arduino IDE sets an arrow behind the time of day."""
+    line = line.replace(" -> ", delimiter, 1)
     if '"' in line:
         line = " ".join(line.split()) if delimiter == " " else line
         return next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))
@@ -132,18 +116,19 @@ def column_of(cells: list[str], decimal: str) -> Column:
     if words.empty:
         return Column("number", values, odd, base)
     middle = words.iloc[words.size // 2]
-    for pattern, drop, insert in _respelled(decimal):
-        if re.fullmatch(pattern, middle):
-            fits = texts[odd | ~np.isnan(values)].str.fullmatch(pattern).to_numpy(dtype=bool)
-            if fits[int(np.argmax(fits)) :].all():  # below the names
-                values, base = _numbers(texts.str.replace(drop, insert, regex=True), decimal)
-                return Column("number", values, odd & np.isnan(values), base)
+    grouped = _GROUPED[decimal].fullmatch(middle)
+    if grouped:
+        fits = texts.str.fullmatch(_GROUPED[decimal]).to_numpy(dtype=bool)
+        rest = odd & ~fits
+        if not rest[int(np.argmax(fits)) :].any():  # below the names
+            values, base = _numbers(texts.str.replace(grouped["set"], ""), decimal)
+            return Column("number", values, rest, base)
     if 2 * words.size <= np.isfinite(values).sum() + words.size:
         return Column("number", values, odd, base)
     clock = clock_of(texts) if _CLOCK.fullmatch(middle) else None
     if clock is not None:
-        since, parts, wrap = clock
-        return Column("clock", since, odd & np.isnan(since), parts=parts, wrap=wrap)
+        since, parts = clock
+        return Column("clock", since, odd & np.isnan(since), parts=parts)
     match, label, unit = _LABELLED[decimal].fullmatch(middle), "", ""
     if middle.lower() in _LEVELS:
         values = texts.str.lower().map(_LEVELS).to_numpy(dtype=float)
@@ -163,59 +148,58 @@ def _numbers(texts: pd.Series[str], decimal: str) -> tuple[Floats, float]:
     if decimal != ".":
         texts = texts.mask(texts.str.contains(".", regex=False), "?")
         texts = texts.str.replace(decimal, ".", regex=False)
+    texts = texts.str.translate({ord("D"): "e", ord("d"): "e"})  # of Fortran
     numbers = pd.to_numeric(texts, errors="coerce")
     if numbers.dtype == np.int64 and numbers.size and abs(numbers.iloc[0]) > 2**53:
         return (numbers - numbers.iloc[0]).to_numpy(dtype=float), float(numbers.iloc[0])
     return numbers.to_numpy(dtype=float, copy=True), 0.0
 
 
-def _respelled(decimal: str) -> list[tuple[str, str, str]]:
-    """Return spellings of all cells of a column: pattern, what is replaced, and by what."""
-    sign, whole = re.escape(decimal), "[+-]?[1-9][0-9]{0,2}"
-    short = rf"[+-]?[0-9]{{1,3}}(?:{sign}[0-9]*)?"
-    groups = (_OTHER[decimal], "'", " ")
-    spellings = [(rf"{short}|{whole}(?:{g}[0-9]{{3}})+(?:{sign}[0-9]*)?", g, "") for g in groups]
-    return [(_PLAIN[decimal], "[dD]", "e"), *spellings]
+def clock_of(cells: pd.Series[str]) -> tuple[Floats, str] | None:
+    """Return s since the first of times, and their parts (day, time).
 
-
-def clock_of(cells: Iterable[str]) -> tuple[Floats, str, int] | None:
-    """Return s since the first of times, their parts (day, time), and the s after which they wrap.
-
-    Of the orders of day, month and year that all dates allow, that of the shortest record counts.
+    A time of day of two parts is minutes and seconds with a fraction. Parts of most cells count.
     """
-    keys, codes, points = dict[tuple[str | None, ...], int](), list[int](), list[float]()
-    none = (None,) * 9
-    for match in map(_CLOCK.fullmatch, cells):
-        day, hour, minute, second, point, ms, half, zone, behind = match.groups() if match else none
-        key = (day or behind, hour, minute, second, half, zone)
-        codes.append(keys.setdefault(key, len(keys)))
-        points.append(float(f"0.{point or ms or 0}"))
-    forms = [(key[0] is not None, key[1] is not None, key[5] is not None) for key in keys]
-    form = Counter(form for form in forms if any(form)).most_common(1)[0][0]
-    good = np.array([one == form for one in forms])[codes]
-    first = int(np.argmax(good))
-    days = _places({key[0] for key in keys if key[0]})
-    short = not form[0] and not any(key[4] for key in keys)  # two parts are minutes and seconds
-    minutes = short and all(key[3] is None for key in keys)
-    begin = [*keys][codes[first]][1]
-    if days is None or (minutes and not any(points) and int(begin or 0)):
+    import pandas as pd
+
+    parts = cells.str.extract(f"^{_CLOCK.pattern}$")
+    forms = parts["day"].notna() * 2 + parts["clock"].notna()
+    form = forms[forms > 0].mode()[0]
+    good = forms == form
+    day, clock, point, ms, half, zone = (parts.loc[good, name] for name in _CLOCK.groupindex)
+    short, point = clock.str.count(":") == 1, point.fillna(ms)
+    if len(zone.unique()) > 1 or (short.any() and (form > 1 or point.isna().all())):
         return None
-    whole = np.array([_seconds(key, days, short=short) for key in keys])[codes]
-    since = np.round(whole - whole[first] + (np.array(points) - points[first]), 9)
-    since[~good] = np.nan
-    hours = {int(key[1] or 0) for key in keys if key[1]}
-    twelve = not any(key[4] for key in keys) and hours <= {*range(1, 13)}
-    wrap = 3600 if minutes else _DAY_S // 2 if twelve else _DAY_S
-    return since, "day" * form[0] + "time" * form[1], wrap
+    since = pd.to_timedelta(clock.mask(short, "0:" + clock) + "." + point.fillna("0"))
+    noon = pd.Timedelta(hours=12)
+    since += noon * (half.str.lower().eq("p").astype(int) - (half.notna() & (since >= noon)))
+    if form > 1:
+        try:
+            since = _days(day) + since.fillna(pd.Timedelta(0))
+        except ValueError:
+            return None
+    values = np.full(cells.size, np.nan)
+    values[good] = np.round((since - since.iloc[0]).dt.total_seconds(), 9)
+    return values, ("", "time", "day", "daytime")[form]
 
 
-def unwrapped(since: Floats, wrap: int) -> Floats:
+def _days(texts: pd.Series[str]) -> pd.Series[pd.Timestamp]:
+    """Return dates with the day before or behind the month, of the shortest record."""
+    import pandas as pd
+
+    names = pd.Series(texts.unique())
+    orders = [pd.to_datetime(names, format="mixed", dayfirst=first) for first in (False, True)]
+    best = min(orders, key=lambda dates: dates.max() - dates.min())
+    return texts.map(best.set_axis(names))
+
+
+def unwrapped(since: Floats) -> Floats:
     """Return times that go on where a clock begins again: over midnight, noon, or an hour."""
-    good = np.flatnonzero(np.isfinite(since))
-    falls = np.diff(since[good], prepend=np.nan) < -0.9 * wrap
-    since = since.copy()
-    since[good] += wrap * np.cumsum(falls)
-    return since
+    good, unbroken = np.flatnonzero(np.isfinite(since)), since.copy()
+    falls = -np.diff(since[good], prepend=np.nan)
+    for wrap in (3600, _DAY_S // 2, _DAY_S):
+        unbroken[good] += wrap * np.cumsum((falls > 0.9 * wrap) & (falls < wrap))
+    return unbroken
 
 
 def counted_since(values: Floats, base: float, unit: float | None) -> Floats | None:
@@ -232,40 +216,3 @@ def counted_since(values: Floats, base: float, unit: float | None) -> Floats | N
         if low <= middle <= high and usual * factor < _LONGEST_STEP and unit in {None, factor}:
             return np.asarray((values - good[0]) * factor)
     return None
-
-
-def _places(days: set[str]) -> dict[str, int] | None:
-    """Return the numbers of days by their texts, in the order of the shortest record."""
-    parts = {day: re.findall(r"\d+|[^\W\d_]+", day) for day in days}
-    records = []
-    for order in ("ymd", "dmy", "mdy"):
-        try:
-            records.append(
-                {day: _ordinal(dict(zip(order, parts[day], strict=True))) for day in days}
-            )
-        except (KeyError, ValueError):
-            continue
-    return min(records, key=lambda one: np.ptp([*(one.values() or [0])]), default=None)
-
-
-def _ordinal(parts: dict[str, str]) -> int:
-    """Return the number of a day by its year, month and day; ValueError for no day."""
-    year, month, day = parts["y"], parts["m"].lower(), parts["d"]
-    if len(year) not in {2, 4} or len(day) > 2 or (month.isdigit() and len(month) > 2):
-        raise ValueError
-    number = int(month) if month.isdigit() else _MONTH.get(month[:4]) or _MONTH[month[:3]]
-    return dt.date(int(year) + 2000 * (len(year) == 2), number, int(day)).toordinal()
-
-
-def _seconds(key: tuple[str | None, ...], days: dict[str, int], *, short: bool) -> int:
-    """Return a day and a time of day in s."""
-    day, *parts, half, zone = key
-    hour, minute, second = (int(part or 0) for part in parts)
-    if half:
-        hour = hour % 12 + 12 * (half in "pP")
-    if short and parts[2] is None:
-        hour, minute, second = 0, hour, minute
-    shift = re.fullmatch(r"([+-]\d\d):?(\d\d)?", zone or "+00")
-    hour -= int(shift[1]) if shift else 0
-    minute -= int(f"{zone[0]}{shift[2]}") if zone and shift and shift[2] else 0
-    return _DAY_S * days.get(day or "", 0) + 3600 * hour + 60 * minute + second

@@ -14,7 +14,7 @@ from pendmap.files import read_whole
 from pendmap.formatting import listed
 from pendmap.tables.findings import finding_of
 from pendmap.tables.matlab import matlab_frame
-from pendmap.tables.table import MOST_BYTES, decoded, refuse_large, table_of
+from pendmap.tables.table import MOST_BYTES, decoded, readable, refuse_large, table_of
 from pendmap.tables.text import parsed
 from pendmap.tables.tracker import TRACKER, tracker_frame
 from pendmap.tables.units import Heading
@@ -32,6 +32,9 @@ TABLES: Final = (*_TEXTS, *_BINARY)
 _ANGLES: Final = ("angle", "velocity", "pixel_x", "acceleration")  # Wanted, best first
 _ZIP: Final = b"PK\x03\x04"
 _MOST_MEMBERS: Final = 200  # Most members of an archive
+_MISSING: Final = (
+    "a Parquet file needs the extra pendmap[viewer] (pyarrow), or must be saved as CSV"
+)
 _OTHERS: Final = {
     b"\x1f\x8b": "must be unpacked, it is compressed",
     b"\x89HDF": "must be CSV or Parquet, it is an HDF5 file",
@@ -64,8 +67,7 @@ def _table(data: bytes, suffix: str, reader: Reader, where: str) -> Table:
     if data[:4] == _ZIP and not is_workbook(data, where):
         return _member(data, reader, where)
     if data[:4] == _ZIP:
-        text, columns, findings = sheet_text(data, where, MOST_BYTES)
-        refuse_large(where, columns=columns)
+        text, findings = sheet_text(data, where)
         reader = dataclasses.replace(reader, delimiter="\t", decimal=reader.decimal or ".")
     else:
         text, findings = decoded(data, where)
@@ -102,7 +104,7 @@ def _member(data: bytes, reader: Reader, where: str) -> Table:
 
 def _parquet(data: bytes, where: str) -> Table:
     """Return the table of a Parquet file, if its declared size is allowed."""
-    try:
+    with readable(where, "Parquet file", _MISSING):
         import pyarrow as pa
         from pyarrow import parquet
 
@@ -117,12 +119,3 @@ def _parquet(data: bytes, where: str) -> Table:
         is_number = (kind.is_integer, kind.is_floating, kind.is_boolean, kind.is_temporal)
         names = [f.name for f in file.schema_arrow if any(is_of(f.type) for is_of in is_number)]
         return table_of(file.read(columns=names, use_threads=False).to_pandas(), where)
-    except InputError:
-        raise
-    except ModuleNotFoundError:
-        raise InputError(
-            f"{where}: a Parquet file needs the extra pendmap[viewer] (pyarrow), or must be saved"
-            " as CSV"
-        ) from None
-    except Exception as error:  # noqa: BLE001 (whatever a damaged file makes of the reader)
-        raise InputError(f"{where}: is no Parquet file that can be read: {error}") from None

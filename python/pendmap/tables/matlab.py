@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap.errors import InputError
+from pendmap.tables.table import readable
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -31,7 +32,7 @@ def matlab_frame(data: bytes, where: str, most: int) -> pd.DataFrame:
     """
     import pandas as pd
 
-    try:
+    with readable(where, "MATLAB file"):
         if data.startswith(b"MATLAB 7.3"):
             import h5py
 
@@ -43,10 +44,6 @@ def matlab_frame(data: bytes, where: str, most: int) -> pd.DataFrame:
             _refuse_bomb(data, where, most)
             content = loadmat(io.BytesIO(data), simplify_cells=True)
             vectors = dict(_vectors("", {k: v for k, v in content.items() if k[:2] != "__"}))
-    except InputError:
-        raise
-    except Exception as error:  # noqa: BLE001 (whatever a damaged file makes of the reader)
-        raise InputError(f"{where}: is no MATLAB file that can be read: {error}") from None
     sizes = [values.size for values in vectors.values()]
     if not sizes:
         raise InputError(f"{where}: must have vectors of {_FEWEST} numbers or more: {_SAVE}")
@@ -68,16 +65,14 @@ def _vectors(name: str, value: Any) -> Iterator[tuple[str, Floats]]:  # noqa: AN
         for k, part in enumerate(value, 1):
             yield from _vectors(f"{name}{k}", part)
     else:
-        array = np.asarray(value)
-        if array.dtype.kind not in "biuf":
+        array = np.asarray(value).squeeze()
+        if array.dtype.kind not in "biuf" or array.ndim not in {1, 2} or max(array.shape) < _FEWEST:
             return
-        array = array.squeeze().astype(float)
-        if array.ndim == 2:
-            array = array if array.shape[0] >= array.shape[1] else array.T
-            parts = [(f"{name} {k}", column) for k, column in enumerate(array.T, 1)]
-        else:
-            parts = [(name, array)] if array.ndim == 1 else []
-        yield from ((head, column) for head, column in parts if column.size >= _FEWEST)
+        if array.ndim == 1:
+            yield name, array.astype(float)
+            return
+        rows = array.T if array.shape[0] >= array.shape[1] else array
+        yield from ((f"{name} {k}", row.astype(float)) for k, row in enumerate(rows, 1))
 
 
 def _refuse_bomb(data: bytes, where: str, most: int) -> None:
@@ -86,12 +81,8 @@ def _refuse_bomb(data: bytes, where: str, most: int) -> None:
     place, size = _HEADER, 0
     while place + tag.size <= len(data):
         kind, length = tag.unpack_from(data, place)
-        packed, place = memoryview(data)[place + 8 : place + 8 + length], place + 8 + length
-        unpacker = zlib.decompressobj()
-        while kind == _COMPRESSED and packed:
-            part = unpacker.decompress(packed, 2**20)
-            packed, size = memoryview(unpacker.unconsumed_tail), size + len(part)
-            if size > most:
-                raise InputError(f"{where}: unpacks to more than {most / 2**20:.0f} MiB")
-            if unpacker.eof:
-                break
+        packed, place = data[place + 8 : place + 8 + length], place + 8 + length
+        if kind == _COMPRESSED:
+            size += len(zlib.decompressobj().decompress(packed, most + 1 - size))
+        if size > most:
+            raise InputError(f"{where}: unpacks to more than {most / 2**20:.0f} MiB")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 from typing import TYPE_CHECKING, Final
 
@@ -13,6 +14,8 @@ from pendmap.tables.findings import finding_of
 from pendmap.tables.text import MOST_COLUMNS, TIME, Table
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     import pandas as pd
 
     from pendmap.tables.findings import Finding
@@ -20,7 +23,21 @@ if TYPE_CHECKING:
 MOST_BYTES: Final = 2**30  # Largest file, and largest table in memory, bytes
 MOST_CONTROLS: Final = 0.02  # Share of control characters above which a file is no text
 MOST_NULS: Final = 0.2  # Share of NUL bytes above which a file is no text
+_CHINESE: Final = re.compile(rb"(?:[\x00-\x7f]++|[\xa1-\xd7][\xa1-\xff])*+")  # of GB 2312
 _CONTROLS: Final = re.compile(r"[\x01-\x08\x0b\x0e-\x1f\x7f]")
+
+
+@contextlib.contextmanager
+def readable(where: str, kind: str, missing: str = "") -> Iterator[None]:
+    """Raise InputError for whatever a damaged file, or a missing package, makes of a reader."""
+    try:
+        yield
+    except InputError:
+        raise
+    except ImportError:
+        raise InputError(f"{where}: {missing}") from None
+    except Exception as error:  # noqa: BLE001 (readers raise many kinds)
+        raise InputError(f"{where}: is no {kind} that can be read: {error}") from None
 
 
 def table_of(frame: pd.DataFrame, where: str) -> Table:
@@ -71,18 +88,11 @@ def decoded(data: bytes, where: str) -> tuple[str, list[Finding]]:
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
-        text = data.decode("gb18030" if _chinese(data) else "latin-1", errors="replace")
+        chinese = _CHINESE.fullmatch(data)
+        text = data.decode("gb18030" if chinese else "latin-1", errors="replace")
     if many or len(_CONTROLS.findall(text)) > MOST_CONTROLS * len(text):
         raise InputError(f"{where}: must be CSV (or other text) or Parquet, it is no text")
     return text, findings
-
-
-def _chinese(data: bytes) -> bool:
-    """Return whether the bytes beyond ASCII are pairs of the common signs of GB 2312."""
-    return all(
-        len(part) % 2 == 0 and max(part[::2]) < 0xD8 and min(part) > 0xA0
-        for part in re.findall(rb"[\x80-\xff]+", data)
-    )
 
 
 def refuse_large(where: str, *, columns: int = 0, size: int = 0) -> None:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import re
-from collections import Counter, defaultdict
+from collections import defaultdict
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -20,7 +20,7 @@ from pendmap.errors import InputError, short_repr
 from pendmap.formatting import counted, listed
 from pendmap.tables.cells import column_of, counted_since, split, unwrapped, weight
 from pendmap.tables.findings import finding_of
-from pendmap.tables.units import CHANNELS, Heading, name_and_unit, spelling
+from pendmap.tables.units import CHANNELS, TIMES, Heading, name_and_unit, spelling
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -42,23 +42,14 @@ _HEADS: Final = 30  # Most lines above the numbers of a short file
 TIME: Final = "t_s"  # Heading of times that a record has as dates
 LARGEST_READING: Final = 1e18  # Largest reading; larger ones are missing
 _POINT: Final = re.compile(r'(?<=:\d\d),(\d{3}|\d{6})(?=[,;\t|"]|$)')  # of s, before a separator
-_HALF: Final = re.compile(r"(?<=\d) (?=[AaPp]\.?[Mm]\b)")  # before am or pm
-_ARROW: Final = re.compile(r"^(\d\d:\d\d:\d\d\.\d+) -> ")  # of the Arduino IDE
-# What loggers set around a name: "Latest: Time (s)", "Time (s) Run #1", "Angle, Ch 1&2 (rad)"
-_MARKS: Final = (
-    re.compile(r"^([^:()\[\]]{1,30}:)\s*(?=\S)"),
-    re.compile(r"(?<=\S)\s+([^\W\d]\w*\s*#?\d+)$"),
-    re.compile(r"(?<=\w)(?:,\s*|\s+)(Ch)\.?\s*\d[\d&, ]*(?=$|[(\[])", re.IGNORECASE),
-)
 _COMMENT: Final = re.compile(r"^\s*(?:[#%!]+|//+|'(?!.*'))\s*")
 _OTHERS: Final = (r"\t", ";", ",", r"\|", r"\s{2,}")  # Separators of names alone
 _WORD: Final = re.compile(r"\S+(?:\s+[(\[][^)\]]*[)\]])?")  # with its unit
 _LETTER: Final = re.compile(r"[^\W\d_]")
 _UNIT: Final = re.compile(r"[(\[]?\s*[^\d\s]{0,8}\d?\s*[)\]]?")
 _ABOVE: Final = 12  # Most lines above the rows that may hold names
-_BLANKS: Final = "\u00a0\u2009\u202f"
-_SET: Final = re.compile(f"(?<=[0-9])[{_BLANKS}](?=[0-9]{{3}}(?![0-9]))")  # of thousands
-_SIGNS: Final = str.maketrans(f"\u2212\u2013{_BLANKS}\uff0c\uff1b\uff1a\uff08\uff09", "--   ,;:()")
+_SET: Final = re.compile(r"(?<=[0-9])[\u00a0\u2009\u202f](?=[0-9]{3}(?![0-9]))")  # of thousands
+_SIGNS: Final = str.maketrans("\u2212\u2013\u00a0\u2009\u202f，；：（）", "--   ,;:()")
 
 
 def _key(rule: object, default: object = None) -> Any:  # noqa: ANN401 (of any type)
@@ -85,7 +76,6 @@ class Table:
     findings: tuple[Finding, ...] = ()
     # Index of each row among the lines that are not empty; unreadable lines leave gaps.
     order: Indices = dataclasses.field(default_factory=lambda: np.empty(0, np.intp))
-    dated: tuple[int, ...] = ()  # columns of dates or times of day, in s since the first
     texts: Mapping[int, str] = dataclasses.field(default_factory=dict)  # a cell of each text column
 
     def __post_init__(self) -> None:
@@ -118,7 +108,7 @@ class _Form:
 def parsed(text: str, reader: Reader, where: str, findings: list[Finding]) -> Table:
     """Return the table of a text; raise InputError if there are no rows of numbers."""
     text = text if text.isascii() else _SET.sub("'", text).translate(_SIGNS)
-    every = _HALF.sub("", text).replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    every = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     places = [k for k, line in enumerate(every, 1) if k > reader.skip_rows and line.strip()]
     if not places:
         raise InputError(f"{where}: must be a file with rows of numbers, it is empty")
@@ -145,7 +135,7 @@ def parsed(text: str, reader: Reader, where: str, findings: list[Finding]) -> Ta
     width = max(k + 1 for k in whole if any(flat[i + k].strip() for i in starts))
     read, columns = np.array(at)[keep], columns[:width]
     names = _headings(lines[begin : read[0]], columns, form, where)
-    dated = _clocks(columns, names)
+    _clocks(columns, names)
     end = len(lines) if tables == 1 else read[-1]
     dropped = number[np.setdiff1d(np.arange(read[0], end), read, assume_unique=True)]
     if dropped.size:
@@ -155,16 +145,14 @@ def parsed(text: str, reader: Reader, where: str, findings: list[Finding]) -> Ta
     if tables > 1:
         ends = f"lines {number[read[0]]} to {number[read[-1]]}"
         findings.append(finding_of("tables-behind", where=ends, tables=tables))
-    firsts = {k: int(np.argmax(column.odd)) for k, column in enumerate(columns) if column.odd.any()}
-    texts = {
-        k: f"{short_repr(flat[starts[i] + k])} in line {number[read[i]]}"
-        for k, i in firsts.items()
-        if columns[k].kind == "text"
-    }
+    texts = {}
+    for k, column in enumerate(columns):
+        if column.kind == "text" and column.odd.any():
+            i = int(np.argmax(column.odd))
+            texts[k] = f"{short_repr(flat[starts[i] + k])} in line {number[read[i]]}"
     values = np.column_stack([column.values + column.base for column in columns])
-    return Table(
-        *(tuple(names), values, number[read], tuple(findings), read - read[0], dated, texts)
-    )
+    order = read - read[0]
+    return Table(tuple(names), values, number[read], tuple(findings), order, texts)
 
 
 def _form_of(lines: list[str], reader: Reader, where: str) -> tuple[_Form, list[str]]:
@@ -175,10 +163,6 @@ def _form_of(lines: list[str], reader: Reader, where: str) -> tuple[_Form, list[
     points = [match[1] for line in sample for match in _POINT.finditer(line)]
     if len(points) > LEAST_ROWS * len(sample) and any(point[0] == "0" for point in points):
         return _form_of([_POINT.sub(r".\1", line) for line in lines], reader, where)
-    if sum(bool(_ARROW.match(line)) for line in sample) > LEAST_ROWS * len(sample):
-        form, _ = _form_of([_ARROW.sub("", line) for line in lines], reader, where)
-        lines = [_ARROW.sub(rf"\1{form.delimiter}", line) for line in lines]
-        return dataclasses.replace(form, width=form.width + 1, least=form.least + 1), lines
     signs = [(reader.delimiter or sign, reader.decimal or decimal) for sign, decimal in SEPARATORS]
     quoted = any('"' in line for line in sample)
     signs = [(a, b) for a, b in dict.fromkeys(signs) if a != b or quoted]
@@ -251,35 +235,28 @@ def _longest(
     return int(read[low - 1]) + 1 if low else 0, keep[low:high], len(edges)
 
 
-def _clocks(columns: list[Column], names: list[str]) -> tuple[int, ...]:
-    """Turn times of day, dates and counts since 1970 into s since the first; return which."""
-    parts = [column.parts for column in columns]
-    day = parts.index("day") if {"day", "time"} <= {*parts} else None
-    dated, timed = list[int](), False
+def _clocks(columns: list[Column], names: list[str]) -> None:
+    """Turn times of day, dates and counts since 1970 into s since the first; name a time t_s."""
+    days = next((column.values for column in columns if column.parts == "day"), None)
+    moving = []
     for k, column in enumerate(columns):
-        if k == day:
-            continue
         name, unit = name_and_unit(names[k])
-        factor = None if unit is None else CHANNELS["time"].units.get(spelling(unit), 0.0)
+        factor = None if unit is None else TIMES.get(spelling(unit), 0.0)
         since: Floats | None = column.values
-        if column.parts == "time" and day is not None:
-            since = column.values + columns[day].values
+        if column.parts == "day":  # without a time of day it is none
+            since = np.full(column.values.size, np.nan)
         elif column.parts == "time":
-            since = unwrapped(column.values, column.wrap)
+            since = unwrapped(column.values) if days is None else column.values + days
         elif not column.parts:
             since = counted_since(column.values, column.base, factor)
-        if since is None:
-            timed |= is_known(names[k], "time") and bool(np.isfinite(column.values).any())
-        else:
+        if since is not None:
             columns[k] = dataclasses.replace(column, values=since, base=0.0)
             names[k] = names[k] if factor in {None, 1.0} else f"{name} [s]"
-            dated.append(k)
-    if day is not None:
-        columns[day] = dataclasses.replace(columns[day], values=columns[day].values * np.nan)
-    moving = [k for k in dated if np.any(columns[k].values > 0)]
-    if any(names) and moving and not timed and not any(is_known(names[k], "time") for k in moving):
+            moving += [k] if np.any(since > 0) else []
+    filled = zip(names, columns, strict=True)
+    timed = any(is_known(n, "time") and np.isfinite(c.values).any() for n, c in filled)
+    if any(names) and moving and not timed:
         names[moving[0]] = TIME
-    return tuple(dated)
 
 
 def _headings(
@@ -294,7 +271,7 @@ def _headings(
     for k, line in enumerate(above[: -_ABOVE - 1 : -1]):
         parts = _parts(line, columns, form)
         close = bool(parts) and k < 3
-        parts = _bare(parts or _otherwise(line, width))
+        parts = parts or _otherwise(line, width)
         if any(map(_LETTER.search, parts)) and (close or any(map(is_known, parts))):
             heads.append(parts)
             if close and k == 0 and not _are_units(parts):
@@ -353,21 +330,6 @@ def _otherwise(line: str, width: int) -> list[str]:
 def _trimmed(parts: list[str]) -> list[str]:
     """Return parts without the empty ones at the end."""
     return parts[: max((k for k, part in enumerate(parts, 1) if part.strip()), default=0)]
-
-
-def _bare(parts: list[str]) -> list[str]:
-    """Return names without what a logger sets around them, if several share it."""
-    for pattern in _MARKS:
-        matches = [pattern.search(part) for part in parts]
-        marks = Counter(match[1] for match in matches if match)
-        mark = next(
-            (mark for mark in marks if marks[mark] > 1 or mark[:2] == "Ch" or "#" in mark), ""
-        )
-        parts = [
-            pattern.sub(" ", part).strip() if match and match[1] == mark else part
-            for part, match in zip(parts, matches, strict=True)
-        ]
-    return parts
 
 
 def _are_units(parts: list[str]) -> bool:

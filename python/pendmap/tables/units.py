@@ -27,9 +27,9 @@ PIVOT_UNITS: Final = {
 _TABLES: Final[dict[str, Any]] = tomllib.loads(
     resources.files("pendmap.tables").joinpath("words.toml").read_text("utf-8")
 )
-TIMES: Final[dict[str, float]] = {name: row[0] for name, row in _TABLES["time"].items()}
-ANGLES: Final[dict[str, float]] = {name: row[0] for name, row in _TABLES["angle"].items()}
-LENGTHS: Final[dict[str, float]] = {name: row[0] for name, row in _TABLES["length"].items()}
+TIMES: Final[dict[str, float]] = _TABLES["time"]
+ANGLES: Final[dict[str, float]] = _TABLES["angle"]
+LENGTHS: Final[dict[str, float]] = _TABLES["length"]
 RAW: Final = frozenset(_TABLES["raw"])
 DEGREE: Final = ANGLES["deg"]
 SPEEDS: Final = {f"{a}/{t}": ANGLES[a] / TIMES[t] for t in ("s", "min") for a in ANGLES}
@@ -41,17 +41,11 @@ _ACCELERATIONS: Final = {
     **ANGULAR_ACCELERATIONS,
 }
 
-
-def _spellings() -> Iterator[tuple[str, str]]:
-    """Yield each spelling of a unit with its name in the tables."""
-    for quantity in ("time", "angle", "length"):
-        for name, (_, words) in _TABLES[quantity].items():
-            yield from ((word, name) for word in (name, *words.split()))
-    for name, words in (_TABLES["raw"] | _TABLES["spelled"]).items():
-        yield from ((word, name) for word in (name.lower(), *words.split()))
-
-
-_UNITS: Final[dict[str, str]] = dict(_spellings())
+_UNITS: Final[dict[str, str]] = {
+    word: name
+    for name, words in _TABLES["spelled"].items()
+    for word in (name.lower(), *words.split())
+}
 # Meanings in the order in which they decide about a heading
 MEANINGS: Final = tuple(_TABLES["words"])
 # Meanings of columns that are not the pendulum's
@@ -94,8 +88,8 @@ class Channel:
         spelled = spelling(unit)
         if spelled not in self.units:
             raise InputError(
-                f"{where}: unit must be one of {', '.join(self.units)}, or have a scale beside it,"
-                f" {self.unit} per unit, in [columns] of experiment.toml, got {unit!r}"
+                f"{where}: unit must be one of {', '.join(self.units)}, or a scale must be given,"
+                f" {self.unit} per unit{' (angle_scale)' * (self.unit == 'rad')}, got {unit!r}"
             )
         return self.units[spelled]
 

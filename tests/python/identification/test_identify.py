@@ -59,11 +59,11 @@ def test_an_experiment_gives_its_longest_free_run() -> None:
     assert report.model == report.best.rig
     with pytest.raises(InputError, match="no run is free"):
         identify(experiment(held, forced))
-    text = "1 run read; 1 shorter run, 1 run held out and 2 forced runs are not used"
+    text = "1 run read; not used: 1 shorter, 1 held out, 2 forced"
     assert left_out(there, [run]) == text
     # A run that is both held out and forced is left out because it is forced.
     both = experiment(run, held, forced, decaying(kind="forced", hold_out=True))
-    assert left_out(both, [run, held]) == "2 runs read; 2 forced runs are not used"
+    assert left_out(both, [run, held]) == "2 runs read; not used: 2 forced"
     assert not left_out(both, both.runs)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from typing import TYPE_CHECKING, Any
 
@@ -219,9 +218,12 @@ def test_the_recipe_on_the_exact_peaks(exact: Peaks, truths: dict[str, Any]) -> 
     small, warnings = combined.small_peaks(exact, wanted["cut"])
     assert not warnings
     assert small.index[[0, -1]].tolist() == [wanted["i0"], wanted["i0"] + wanted["k"]]
-    result = combined.from_amplitudes(np.abs(small.amplitude), small.time, "all", 0)
-    for name in ("delta", "zeta", "theta_r", "mean_period", "w0", "Tr"):
-        assert getattr(result, name) == pytest.approx(wanted[name], rel=1e-9), name
+    size = np.abs(small.amplitude)
+    w0, _, friction = combined.from_amplitudes(np.concatenate((size, small.time)))
+    made = {"delta": combined.decrement(size), "theta_r": combined.coulomb(size)}
+    made |= {"mean_period": mean_period(small.time), "w0": w0, "Tr": friction}
+    for name, value in made.items():
+        assert value == pytest.approx(wanted[name], rel=1e-9), name
     deltas, _ = combined.triplets(np.abs(small.amplitude))
     assert deltas.mean() == pytest.approx(wanted["delta_triplet_mean"], rel=1e-9)
     parameters = combined.from_peaks(exact).parameters
@@ -241,13 +243,9 @@ def test_eqs_2_7_and_2_10_give_the_reference_numbers(truths: dict[str, Any]) -> 
         assert combined.coulomb(peaks) * w0**2 == pytest.approx(theta_r * w0**2, abs=1e-12)
         period = 2 * math.pi / (w0 * math.sqrt(1 - zeta**2))
         assert mean_period(times) == pytest.approx(period, rel=1e-12)
-        # All triplets agree, and so do both readings of "odd half cycles alone".
+        # All triplets agree.
         for values, wanted in zip(combined.triplets(peaks), (delta, theta_r), strict=True):
             assert values == pytest.approx(wanted, abs=1e-10)
-        for reading, parity in itertools.product(("odd_ends", "odd_triplets"), (0, 1)):
-            result = combined.from_amplitudes(peaks, times, reading, parity)
-            assert result.delta == pytest.approx(delta, abs=1e-10)
-            assert result.theta_r == pytest.approx(theta_r, abs=1e-10)
 
 
 def test_the_period_over_amplitude_is_the_reference_one(truths: dict[str, Any]) -> None:
@@ -261,8 +259,6 @@ def test_the_period_over_amplitude_is_the_reference_one(truths: dict[str, Any]) 
     ("name", "made", "wanted"),
     [
         ("combined", SMALL, {"w0": 2e-3, "c_over_m": 0.03, "Tr": 0.03}),
-        ("combined_odd_ends", SMALL, {"w0": 2e-3, "c_over_m": 0.03, "Tr": 0.03}),
-        ("combined_odd_triplets", SMALL, {"w0": 2e-3, "c_over_m": 0.05, "Tr": 0.05}),
         ("combined_repaired", SMALL, {"w0": 1e-5, "c_over_m": 0.02, "Tr": 0.02, "offset": 5e-3}),
         ("combined_repaired", VISCOUS, {"w0": 1e-5, "c_over_m": 0.01, "offset": 5e-3}),
         ("log_decrement", VISCOUS, {"w0": 2e-3, "c_over_m": 0.01}),
@@ -314,7 +310,7 @@ def test_errors_match_the_scatter(name: str, made: Decay, seconds: float, noise:
 
 def test_what_a_method_cannot_hold_is_a_warning() -> None:
     offset = record(WIDE, offset=math.radians(0.05), counts=4096)
-    result = methods_of(*offset, "combined_odd_triplets")["combined_odd_triplets"]
+    result = methods_of(*offset, "combined")["combined"]
     assert result["c_over_m"] < 0
     assert any(text.startswith("unphysical: c_over_m") for text in result.warnings)
     assert result.rig.c_over_m == 0

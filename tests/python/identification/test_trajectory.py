@@ -187,6 +187,13 @@ def test_errors_of_coarse_counts_are_those_of_intervals(noise: float, rate: floa
     assert np.sqrt(np.mean(np.square(away))) < 1.4
 
 
+def test_the_noise_of_few_readings_is_that_of_their_swings() -> None:
+    time, theta = record(decay(release=2.0), seconds=2.4, rate=10, noise_deg=0.05)
+    joint = joint_fit(time, theta)
+    assert joint.noise == pytest.approx(math.radians(0.05), rel=0.7)
+    assert joint.fit.widening < 4
+
+
 def test_samples_at_rest_on_one_count_add_no_information() -> None:
     made = decay(w0=6.2, c_over_m=0.2, tr=0.5, release=1.5, until=60.0)
     errors = []
@@ -254,7 +261,7 @@ def test_weights_halve_the_errors_and_match_the_scatter(fine: np.ndarray) -> Non
     for seed in range(10):
         theta = late(fine, 2.5e-3, 1e-3, seed)
         reading = reading_of(TIME, theta, count=0.0)
-        alike = dataclasses.replace(reading, each=reading.alike)
+        alike = dataclasses.replace(reading, each=np.full_like(reading.each, reading.sigma))
         result = trajectory_of(TIME, theta)
         other, _ = fit_from_start([FitRun(TIME, theta, alike.each)], [alike])
         assert any("missed their stamps by 2." in warning for warning in result.warnings)

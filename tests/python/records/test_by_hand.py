@@ -27,7 +27,12 @@ X, Y = 0.4 * np.sin(THETA), -0.4 * np.cos(THETA)
 FILES = {
     "plain": (text((TIME, THETA)), {}),
     "unlike": (text((OTHER, TIME, np.degrees(THETA)), "a,b,c"), {"time": "b", "angle": 3}),
-    "nameless": (text((OTHER, TIME, THETA), ""), {"time": 2, "angle": 3}),
+    "nameless": (text((OTHER, TIME, THETA), ""), {}),
+    "nameless whole numbers": (
+        text((OTHER, 0 * TIME, 1e3 * TIME, np.arange(TIME.size), THETA), ""),
+        {},
+    ),
+    "nameless beside millis": (text((TIME, 1e3 * TIME, OTHER, THETA), ""), {}),
     "alike": (text((OTHER, TIME, THETA), "v,t,v"), {"time": 2, "angle": 3}),
     "counts": (text((1e3 * TIME, COUNTS), "clk,enc"), {"time": 1, "time_unit": "ms", "angle": 2}),
     "volts": (text((TIME, 0.5 * THETA), "t,out [V]"), {"angle": "out", "angle_scale": 2}),
@@ -118,7 +123,7 @@ def test_options_override_the_description_of_every_file(tmp_path: Path) -> None:
         ({"from": 5, "to": 2}, "'--from': must be less than to_s = 2, got 5"),
         ({"from": 50}, "must be times within 0 to 12 s, they leave 0 samples"),
         ({"x": 2}, "both or neither of pixel_x and pixel_y must be given, got one"),
-        ({"counts-per-turn": 0}, "encoder_counts must be a whole number from 1 to .*, got 0"),
+        ({"counts-per-turn": 0}, "'--counts-per-turn': must be a whole number from 1 to .*, got 0"),
     ],
 )
 def test_an_invalid_value_is_refused_in_one_line(
@@ -172,6 +177,12 @@ def test_columns_whose_names_say_nothing_are_taken_by_their_values(
     (run,) = pendmap.read_experiment(tmp_path / "run.csv")
     np.testing.assert_allclose(run.theta, THETA, atol=2e-6)
     assert any(finding.what == "columns-guessed" for finding in run.findings)
+
+
+def test_without_names_noise_is_no_angle(tmp_path: Path) -> None:
+    (tmp_path / "run.csv").write_text(text((TIME, OTHER, -OTHER), ""), "utf-8")
+    with pytest.raises(pendmap.InputError, match=r"no column of angles: .* --angle 2$"):
+        pendmap.read_experiment(tmp_path / "run.csv")
 
 
 def test_times_that_look_like_milliseconds_are_not_cut_in_seconds(tmp_path: Path) -> None:

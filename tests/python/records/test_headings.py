@@ -106,11 +106,16 @@ def test_headings_of_nine_languages(tmp_path: Path, line: str) -> None:
 @pytest.mark.parametrize(
     ("names", "scale", "says", "way"),
     [
-        ("Zeit (s),Spannung (V)", 1.0, "the scale of 'Spannung (V)'", "--angle-scale 1"),
-        ("time_s,angle_counts", 400.0, "the scale of 'angle_counts'", "--counts-per-turn 2400"),
-        ("t,x (cm)", 30.0, "'x (cm)' is a length", "--angle 2 --angle-scale 0.025"),
-        ("Temps (s),Déplacement (m)", 0.4, "is a length", "--angle 2 --angle-scale 2.5"),
-        ("t,y", 300.0, "'y' is a length", "--angle 2 --angle-scale 0.0025"),
+        ("Zeit (s),Spannung (V)", 1.0, "the unit or scale of 'Spannung (V)'", "--angle-scale 1"),
+        (
+            "time_s,angle_counts",
+            400.0,
+            "the unit or scale of 'angle_counts'",
+            "--counts-per-turn 2400",
+        ),
+        ("t,x (cm)", 30.0, "here 40 cm", "--angle 2 --angle-scale 0.025"),
+        ("Temps (s),Déplacement (m)", 0.4, "here 0.4 m", "--angle 2 --angle-scale 2.5"),
+        ("t,y", 300.0, "here 400 px", "--angle 2 --angle-scale 0.0025"),
         ("t,Winkel [Bq]", 1.0, "'Bq' is not known as a unit", "--angle 2 --angle-unit deg"),
     ],
 )

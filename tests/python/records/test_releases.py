@@ -213,7 +213,7 @@ def test_a_still_run_is_left_out_and_its_reason_is_given(tmp_path: Path) -> None
     moving = Run("c", "c.csv", "free", time, noisy(theta), np.ones(time.size, bool))
     report = identify(Experiment(tmp_path, (still[0], moving)), methods=["trajectory"])
     assert [run.name for run in report.runs] == ["c"]
-    assert "1 run read; 1 run in which nothing moves is not used" in list(as_text(report))
+    assert "1 run read; not used: 1 at rest" in list(as_text(report))
 
 
 @pytest.mark.parametrize("angle", [0.3, 1.3, 2.8])

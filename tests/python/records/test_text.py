@@ -42,8 +42,8 @@ FILES: dict[str, tuple[list[str], str]] = {
     "names by commas, rows by tabs": (["- 3 -", "Time,Drive,Angle", *lines("{t:.2f}\t1.5\t{a:.5f}", comma=True)], "Time Angle"),
     "names by blanks, with units": (["Time (s) Angle (rad)", *row("\t")], "Time (s) Angle (rad)"),
     "long names, short names, units": (["Run 1", "Time\tAngle", "T\tA", "s\trad", *row("\t")], "Time [s] Angle [rad]"),
-    "a prefix": (['"Latest: Time (s)","Latest: Angle (rad)"', *row(",")], "Time (s) Angle (rad)"),
-    "a suffix": (["Time (s) Run #1,Angle (rad) Run #1", *row(",")], "Time (s) Angle (rad)"),
+    "a prefix": (['"Latest: Time (s)","Latest: Angle (rad)"', *row(",")], "Latest: Time (s) Latest: Angle (rad)"),
+    "a suffix": (["Time (s) Run #1,Angle (rad) Run #1", *row(",")], "Time (s) Run #1 Angle (rad) Run #1"),
     "a line of runs": (["Run #1;", "Time (s);Angle (rad)", *row(";")], "Time (s) Angle (rad)"),
     "a comment": (["% by hand", "% t\ttheta", *row("\t")], "t theta"),
     "a line of settings": (["rate,25", "t,theta", *row(",")], "t theta"),
@@ -66,7 +66,11 @@ FILES: dict[str, tuple[list[str], str]] = {
     "dates, day first": (["Datum;Winkel", *lines("{d:%d.%m.%Y %H:%M:%S.%f};{a:.5f}")], "Datum Winkel"),
     "dates, month first": (["Date,Angle", *lines("{d:%m/%d/%Y %I:%M:%S.%f %p},{a:.5f}")], "t_s Angle"),
     "dates with names of months": (["angle,when", *lines("{a:.5f},{d:%d %b %Y %H:%M:%S.%f}")], "t_s angle"),
+    "dates without marks": (["Time;Angle", *lines("{d:%Y%m%d %H:%M:%S.%f};{a:.5f}")], "Time Angle"),
+    "a time beside an empty one": (["t_s,time_ms,theta_rad", *lines(",{us},{a:.5f}")], "time_ms theta_rad"),
+    "an arrow": (["", *lines("{d:%H:%M:%S.%f} -> {a:.5f}")], "column 1 column 2"),
     "date and time apart": (["Date,Time,Angle", *lines("{d:%d/%m/%Y},{d:%H:%M:%S.%f},{a:.5f}")], "Time Angle"),
+    "s since 1970": (["clock,theta", *[f"{1738928443 + float(x):.2f},{y}" for x, y in (z.split() for z in lines("{t:.2f} {a:.5f}"))]], "clock theta"),
     "ns since 1970": (["time (ns),theta", *[f"{1738928443 * 10**9 + int(x)},{y}" for x, y in (z.split() for z in lines("{us} {a:.5f}"))]], "time [s] theta"),
 }  # fmt: skip
 

@@ -146,7 +146,7 @@ def options_of(
 _READING: Final = "time angle velocity x y time_unit angle_unit angle_scale rate=rate_hz"
 _COLUMNS: Final = dict.fromkeys(("time", "angle", "velocity", "x", "y"), types.COLUMN)
 reading_options: Final = options_of(
-    "records.overrides.ByHand",
+    "records.by_hand.ByHand",
     f"{_READING} from=from_s to=to_s counts_per_turn",
     options.RECORD,
     **_COLUMNS,
@@ -156,4 +156,4 @@ reading_options: Final = options_of(
 
 def take_reading(given: dict[str, Any]) -> Any:  # noqa: ANN401 (a ByHand)
     """Remove the options that say how records are read from ``given`` and return them."""
-    return {name: given.pop(name) for name in parameters("records.overrides.ByHand")}
+    return {name: given.pop(name) for name in parameters("records.by_hand.ByHand")}

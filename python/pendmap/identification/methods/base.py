@@ -11,6 +11,7 @@ import numpy as np
 from pendmap.formatting import Estimate, counted, estimate_text
 from pendmap.identification.parameters import OPPOSING, PLACES, widened
 from pendmap.identification.results import Parameters
+from pendmap.identification.uncertainty import computed_from
 from pendmap.model import Rig
 from pendmap.signal.robust import Z95
 
@@ -107,13 +108,12 @@ class Identification(Parameters):
 
     def with_clock(self, stderr: float) -> Identification:
         """Return the result with the relative standard error of a sampling interval added."""
-        estimates, further = {}, {}
+        further = {n: stderr * PLACES[n][1] * self[n] for n in self.estimates if n in PLACES}
+        estimates = {}
         for name, e in self.estimates.items():
-            clock_error = further[name] = (
-                stderr * PLACES[name][1] * e.value if name in PLACES else 0.0
-            )
-            error = None if e.stderr is None else math.hypot(e.stderr, clock_error)
-            ends = None if e.ci95 is None else widened(e.value, e.ci95, clock_error)
+            more = further.setdefault(name, 0.0)
+            error = None if e.stderr is None else math.hypot(e.stderr, more)
+            ends = None if e.ci95 is None else widened(e.value, e.ci95, more)
             estimates[name] = Estimate(e.value, error, ends)
         covariance = self.covariance
         if covariance is not None:
@@ -136,27 +136,13 @@ class Identification(Parameters):
 
         Errors are by the delta method; without a covariance the parameters are independent.
         """
-        made = {}
-        for name, numerator, power in (("zeta", "c_over_m", 1), ("theta_r", "Tr", 2)):
-            if numerator not in self.estimates or "w0" not in self.estimates:
-                continue
-            over, w0 = self.estimates[numerator], self.estimates["w0"]
-            scale = 1 / (2 * w0.value) if power == 1 else 1 / w0.value**2
-            value = over.value * scale
-            if over.stderr is None or w0.stderr is None:
-                ends = over.ci95
-                made[name] = Estimate(
-                    value, None, None if ends is None else (scale * ends[0], scale * ends[1])
-                )
-                continue
-            lever = -power * value / w0.value
-            names, matrix = self.covariance or ((), np.empty((0, 0)))
-            both = {numerator, "w0"} <= set(names)
-            shared = float(matrix[names.index(numerator), names.index("w0")]) if both else 0.0
-            variance = (scale * over.stderr) ** 2 + (lever * w0.stderr) ** 2
-            error = math.sqrt(max(variance + 2 * scale * lever * shared, 0.0))
-            made[name] = Estimate(value, error, (value - Z95 * error, value + Z95 * error))
-        return made
+        given = {n: e for n, e in self.estimates.items() if n in ("w0", *OPPOSING)}
+
+        def quantities(p: dict[str, float]) -> dict[str, float]:
+            made = {"zeta": ("c_over_m", 2 * p["w0"]), "theta_r": ("Tr", p["w0"] ** 2)}
+            return {n: p[over] / under for n, (over, under) in made.items() if over in p}
+
+        return computed_from(given, self.covariance, quantities) if "w0" in given else {}
 
     @property
     def rig(self) -> Rig:
@@ -166,9 +152,7 @@ class Identification(Parameters):
         known: dict[str, Any] = {
             n: e.value for n, e in self.estimates.items() if n in Rig.numbers()
         }
-        for name in OPPOSING:
-            if name in known:
-                known[name] = max(known[name], 0.0)
+        known |= {n: max(known[n], 0.0) for n in OPPOSING if n in known}
         if not math.isfinite(known.get("w0", math.nan)):
             raise ValueError(f"{self.method} found no w0")
         return Rig(**known)
@@ -197,21 +181,22 @@ def identified(  # noqa: PLR0913 (all of a result)
     misfit: float | None = None,
     intervals: Mapping[str, tuple[float, float]] | None = None,
 ) -> Identification:
-    """Return a result with normal 95 % intervals unless they are given.
+    """Return a result with normal 95 % intervals unless they are given; errors of 0 are unknown.
 
     A warning is added for each negative damping parameter.
     """
-    estimates, negative = {}, []
+    estimates, negative, known = {}, [], bool(np.any(covariance))
     for name, value, variance in zip(names, values.tolist(), np.diag(covariance), strict=True):
         error = math.sqrt(max(float(variance), 0.0))
         normal = (value - Z95 * error, value + Z95 * error)
-        estimates[name] = Estimate(value, error, (intervals or {}).get(name, normal))
+        ci95 = (intervals or {}).get(name, normal)
+        estimates[name] = Estimate(value, error, ci95) if known else Estimate(value)
         if name in OPPOSING and value < 0:
             negative.append(f"unphysical: {name} is {value:.4g}, below 0")
     return Identification(
         estimates=estimates,
         used=used,
         warnings=(*warnings, *negative),
-        covariance=(names, np.asarray(covariance)),
+        covariance=(names, np.asarray(covariance)) if known else None,
         misfit=misfit,
     )

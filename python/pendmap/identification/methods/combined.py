@@ -5,9 +5,8 @@ Horton, Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A, section 2, eqs. 2.4 to 
 
 from __future__ import annotations
 
-import dataclasses
 import math
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -20,47 +19,10 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats
 
 
-Reading = Literal["all", "odd_ends", "odd_triplets"]  # Interpretations of the peaks to be used
-
 CUT: Final = math.radians(12.0)
 """Amplitude above which peaks are excluded, rad: the pendulum is nonlinear there."""
 
 _FEWEST: Final = 4  # Fewest peaks below the cut
-_USES: Final[dict[Reading, str]] = {
-    "all": "of them the first two and the last two",
-    "odd_ends": "of them the first two and the last two that begin at an odd peak",
-    "odd_triplets": "the mean over all triplets that begin at an odd peak",
-}
-"""Description of the peaks used by each interpretation, for the result."""
-
-
-@dataclasses.dataclass(frozen=True)
-class Decrement:
-    """Result of the combined method for a decay of small amplitude."""
-
-    delta: float  # zeta / sqrt(1 - zeta^2), eq. 2.7
-    theta_r: float  # Tr / w0^2, rad, eq. 2.10
-    mean_period: float  # mean period of all overlapping full cycles, s
-
-    @property
-    def zeta(self) -> float:
-        """Damping ratio."""
-        return self.delta / math.sqrt(1 + self.delta**2)
-
-    @property
-    def w0(self) -> float:
-        """Natural frequency ``2 pi / (mean_period sqrt(1 - zeta^2))``, rad/s."""
-        return 2 * math.pi / (self.mean_period * math.sqrt(1 - self.zeta**2))
-
-    @property
-    def Tr(self) -> float:  # noqa: N802 (the paper's name)
-        """Coulomb friction over inertia, rad/s^2."""
-        return self.w0**2 * self.theta_r
-
-    @property
-    def si(self) -> Floats:
-        """Array of ``w0, c_over_m, Tr``, SI."""
-        return np.array([self.w0, 2 * self.zeta * self.w0, self.Tr])
 
 
 def recursion(first: float, delta: float, theta_r: float, count: int) -> Floats:
@@ -105,19 +67,16 @@ def triplets(peaks: Floats) -> tuple[Floats, Floats]:
     return delta, theta_r
 
 
-def from_amplitudes(peaks: Floats, times: Floats, reading: Reading, parity: int) -> Decrement:
-    """Return the result of eqs. 2.7 and 2.10; ``parity`` is that of the first peak's number."""
-    if reading == "odd_triplets":
-        deltas, thetas = (values[1 - parity :: 2] for values in triplets(peaks))
-        delta, theta_r = float(np.mean(deltas)), float(np.mean(thetas))
-    else:
-        used = peaks
-        if reading == "odd_ends":
-            # Both pairs of neighbours in eq. 2.7 begin at an odd peak.
-            used = used[1 - parity :]
-            used = used[: used.size - used.size % 2]
-        delta, theta_r = decrement(used), coulomb(used)
-    return Decrement(delta, theta_r, mean_period(times))
+def from_amplitudes(values: Floats) -> Floats:
+    """Return ``w0, c_over_m, Tr``, SI, from absolute peaks and, behind them, their times.
+
+    ``zeta = delta / sqrt(1 + delta^2)``, ``w0 = 2 pi / (mean_period sqrt(1 - zeta^2))``.
+    """
+    peaks, times = np.split(values, 2)
+    delta = decrement(peaks)
+    zeta = delta / math.sqrt(1 + delta**2)
+    w0 = 2 * math.pi / (mean_period(times) * math.sqrt(1 - zeta**2))
+    return np.array([w0, 2 * zeta * w0, w0**2 * coulomb(peaks)])
 
 
 def small_peaks(peaks: Peaks, cut: float = CUT) -> tuple[Peaks, list[str]]:
@@ -135,18 +94,16 @@ def small_peaks(peaks: Peaks, cut: float = CUT) -> tuple[Peaks, list[str]]:
     return small, warnings
 
 
-def from_peaks(peaks: Peaks, *, reading: Reading = "all", cut: float = CUT) -> Identification:
+def from_peaks(peaks: Peaks) -> Identification:
     """Identify viscous damping and Coulomb friction by the combined decrement as printed.
 
     Peaks above the cut (12 degrees) are excluded; eq. 2.7 gives ``delta``, eq. 2.10 ``theta_r``,
     the mean period ``w0 = 2 pi / (mean_period sqrt(1 - zeta^2))``; standard errors are by the delta
-    method, intervals by a parametric bootstrap of the peaks. The paper starts "only on odd half
-    cycles": ``odd_ends`` applies eq. 2.7 to the first and the last pair of peaks that begin at an
-    odd peak, ``odd_triplets`` averages over such triplets. The method is biased by the nonlinearity
-    (1.5 % in delta at 12 degrees) and by a zero error of the angle, and eq. 2.7 uses only four
-    peaks; the module ``repaired`` corrects that.
+    method, intervals by a parametric bootstrap of the peaks. The method is biased by the
+    nonlinearity (1.5 % in delta at 12 degrees) and by a zero error of the angle, and eq. 2.7 uses
+    only four peaks; the module ``repaired`` corrects that.
     """
-    small, warnings = small_peaks(peaks, cut)
+    small, warnings = small_peaks(peaks)
     size = np.abs(small.amplitude)
     while size.size > _FEWEST and not size[-2] > size[-1]:
         size = size[:-1]
@@ -154,25 +111,19 @@ def from_peaks(peaks: Peaks, *, reading: Reading = "all", cut: float = CUT) -> I
         few = len(small) - size.size
         warnings.append(f"the last peaks ({few}) do not decrease and were dropped")
         small = small.select(np.arange(len(small)) < size.size)
-    least = _FEWEST + (reading != "all") * 2
-    if size.size < least:
-        where = f"under {math.degrees(cut):.3g} degrees"
+    if size.size < _FEWEST:
+        where = f"under {math.degrees(CUT):.3g} degrees"
         why = ": the record ends above it" if len(peaks) and not len(small) else ""
-        return too_few(size.size, least, len(peaks.turned), where, warnings, why)
-    parity = int(small.index[0]) % 2
+        return too_few(size.size, _FEWEST, len(peaks.turned), where, warnings, why)
     count = len(small)
-
-    def compute(values: Floats) -> Floats:
-        return from_amplitudes(values[:count], values[count:], reading, parity).si
-
     values = np.concatenate((size, small.time))
     stderr = np.concatenate((small.stderr_amplitude, small.stderr_time))
-    estimates = compute(values)
+    estimates = from_amplitudes(values)
     if not np.isfinite(estimates).all():
         reason = "a difference of peaks has the wrong sign: no logarithm in eq. 2.7"
         return inapplicable(reason, warnings)
-    covariance = propagated(compute, values, stderr)
-    draws = bootstrap(compute, values, stderr)
+    covariance = propagated(from_amplitudes, values, stderr)
+    draws = bootstrap(from_amplitudes, values, stderr)
     failed = float(np.mean(~np.isfinite(draws).all(axis=1)))
     names = ("w0", "c_over_m", "Tr")
     low, high = np.nanpercentile(draws, (2.5, 97.5), axis=0)
@@ -188,8 +139,9 @@ def from_peaks(peaks: Peaks, *, reading: Reading = "all", cut: float = CUT) -> I
         covariance,
         intervals=intervals,
         used=(
-            f"peaks {small.index[0]} to {small.index[-1]} ({count}, under {math.degrees(cut):.3g} "
-            f"degrees); {_USES[reading]}; the mean of {count - 2} overlapping periods"
+            f"peaks {small.index[0]} to {small.index[-1]} ({count}, under {math.degrees(CUT):.3g} "
+            f"degrees); of them the first two and the last two; the mean of {count - 2} "
+            "overlapping periods"
         ),
         warnings=warnings,
     )

@@ -30,8 +30,7 @@ if TYPE_CHECKING:
 _FEWEST: Final = 5  # Fewest peaks
 _LARGEST: Final = 2.0
 """Amplitude below which peaks determine w0, rad: above, damping affects the half period."""
-_PHASE: Final = 0.5
-"""Half-width of the windows in which the velocity is fitted, rad of phase w0 t."""
+_PHASE: Final = 0.5  # Half-width of the windows in which the velocity is fitted, rad of phase w0 t
 _SAMPLES: Final = 25
 """Samples per period below which a warning is given: the quartic smooths the velocity."""
 
@@ -62,7 +61,6 @@ def from_peaks(peaks: Peaks, record: tuple[Floats, Floats]) -> Identification:
         zero += float(values[2])
     zeta = float(values[0]) / (2 * w0)
     period = frequency(small, zeta=min(abs(zeta), 0.9), offset=zero)
-    names = ("w0", "c_over_m", "Tr", "offset")
     estimates = np.array([period.w0, values[0], values[1], zero])
     # Energies are in units of w0^2: its error propagates to both dampings.
     full = np.zeros((4, 4))
@@ -82,7 +80,7 @@ def from_peaks(peaks: Peaks, record: tuple[Floats, Floats]) -> Identification:
             "are widened by it"
         )
     return identified(
-        names,
+        ("w0", "c_over_m", "Tr", "offset"),
         estimates,
         full,
         used=(

@@ -64,9 +64,7 @@ def log_decrement(peaks: Peaks, *, cut: float = CUT) -> Identification:
         return np.array([w0, 2 * zeta * w0])
 
     values = np.concatenate((size, small.time))
-    estimates = compute(values)
     stderr = np.concatenate((small.stderr_amplitude, small.stderr_time))
-    covariance = propagated(compute, values, stderr)
     if not small.known:
         misfit = math.nan
     if misfit > MISFIT:
@@ -75,11 +73,10 @@ def log_decrement(peaks: Peaks, *, cut: float = CUT) -> Identification:
             f"straight line of decrement {-decrements[1] / math.pi:.3g}; the errors do not "
             "include non-viscous damping"
         )
-    names = ("w0", "c_over_m")
     return identified(
-        names,
-        estimates,
-        covariance,
+        ("w0", "c_over_m"),
+        compute(values),
+        propagated(compute, values, stderr),
         used=(
             f"the first and the last of peaks {small.index[0]} to {small.index[-1]} "
             f"({count}{under}); the mean of {full.size} overlapping periods"
@@ -100,17 +97,10 @@ def de_paula(
     """
     turned = peaks.turned
     size = np.abs(turned.amplitude)
-    windows = {"fast": fast, "slow": slow}
-    chosen = {n: turned.select((size >= low) & (size < high)) for n, (low, high) in windows.items()}
-    lacking = [
-        too_few(len(some), _FEWEST, len(turned), _between(windows[name]))
-        for name, some in chosen.items()
-        if len(some) < _FEWEST
-    ]
-    if lacking:
-        texts = tuple(text for result in lacking for text in result.warnings)
-        return Identification(warnings=texts, applicable=False)
-    quick, slack = chosen["fast"], chosen["slow"]
+    quick, slack = (turned.select((size >= low) & (size < high)) for low, high in (fast, slow))
+    for some, window in ((quick, fast), (slack, slow)):
+        if len(some) < _FEWEST:
+            return too_few(len(some), _FEWEST, len(turned), _between(window))
     warnings = []
     speed = frequency(
         turned.select((size < max(fast[1], slow[1])) & (size >= min(fast[0], slow[0])))
@@ -134,13 +124,10 @@ def de_paula(
 
     inner = np.array([speed.w0, rate[1], fall[1]])
     errors = np.array([speed.stderr, rate_cov[1, 1] ** 0.5, fall_cov[1, 1] ** 0.5])
-    covariance = propagated(compute, inner, errors)
-    estimates = compute(inner)
-    names = ("w0", "c_over_m", "Tr")
     return identified(
-        names,
-        estimates,
-        covariance,
+        ("w0", "c_over_m", "Tr"),
+        compute(inner),
+        propagated(compute, inner, errors),
         used=(
             f"exponential through the {len(quick)} peaks {_between(fast)}, straight line through "
             f"the {len(slack)} {_between(slow)}; times of all of these"

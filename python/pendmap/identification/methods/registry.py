@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
+import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from pendmap.errors import InputError
-from pendmap.formatting import Estimate
 from pendmap.identification.methods import combined, energy_balance, lines, repaired
 from pendmap.identification.methods.base import NEEDS_SAMPLES, Identification, inapplicable
 from pendmap.signal.robust import normal_scale
@@ -25,8 +24,6 @@ BEST: Final = "trajectory"  # The default method
 
 _OF_PEAKS: Final[Mapping[str, Callable[[Peaks], Identification]]] = {
     "combined": combined.from_peaks,
-    "combined_odd_ends": functools.partial(combined.from_peaks, reading="odd_ends"),
-    "combined_odd_triplets": functools.partial(combined.from_peaks, reading="odd_triplets"),
     "combined_repaired": repaired.from_peaks,
     "log_decrement": lines.log_decrement,
     "de_paula": lines.de_paula,
@@ -75,19 +72,10 @@ def identify_peaks(peaks: Peaks, names: Iterable[str]) -> dict[str, Identificati
         stderr_time=np.full(size, scatter(peaks.time)),
         stderr_amplitude=np.full(size, scatter(np.abs(peaks.amplitude))),
     )
-    results = {name: apply_method(name, peaks) for name in names}
-    for name, one in results.items():
-        # Errors of 0 are unknown errors; a fit estimates errors from its residuals.
-        if not peaks.known and not any(estimate.stderr for estimate in one.estimates.values()):
-            bare = {n: Estimate(estimate.value) for n, estimate in one.estimates.items()}
-            results[name] = dataclasses.replace(one, estimates=bare, covariance=None)
-    return results
+    return {name: apply_method(name, peaks) for name in names}
 
 
 FEWEST: Final = 16  # Fewest values from which a scatter is estimated: eight differences, to a third
-
-_DIFFERENCE: Final = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
-"""Coefficients of the fourth difference, which vanishes for a cubic."""
 
 
 def scatter(values: Floats) -> float:
@@ -98,8 +86,5 @@ def scatter(values: Floats) -> float:
     """
     if values.size < FEWEST:
         return 0.0
-    size = values.size - 8
-    differences: Floats = sum(
-        weight * values[2 * k : 2 * k + size] for k, weight in enumerate(_DIFFERENCE)
-    )
-    return normal_scale(np.asarray(differences)) / float(np.sqrt(np.sum(_DIFFERENCE**2)))
+    differences = np.concatenate([np.diff(values[k::2], n=4) for k in (0, 1)])
+    return normal_scale(differences) / math.sqrt(70)

@@ -22,20 +22,20 @@ if TYPE_CHECKING:
 _FEWEST: Final = 6  # Fewest peaks below the cut
 
 
-def from_peaks(peaks: Peaks, *, cut: float = CUT) -> Identification:
+def from_peaks(peaks: Peaks) -> Identification:
     """Identify viscous damping and Coulomb friction by the corrected combined decrement.
 
-    All peaks under the cut (rad) are fitted by ``x_k = b + s (-1)^k a_k`` with ``a_k`` by eqs. 2.4
+    All peaks below 12 degrees are fitted by ``x_k = b + s (-1)^k a_k`` with ``a_k`` by eqs. 2.4
     to 2.6 of Horton, Wiercigroch & Xu (2008), Phil. Trans. R. Soc. A. The unknowns are ``a_0``,
     ``delta``, ``theta_r`` and the angle's zero error ``b``; weights are from the peaks' standard
     errors. The final half cycle, in which the pendulum stops, is excluded. ``w0`` is from the
     amplitude-corrected period ``T = 4 K(m) / w0``, ``m = sin^2(A/2)``, fitted to the times of these
     peaks. The remaining bias is that of the linear recursion at 12 degrees.
     """
-    small, warnings = small_peaks(peaks, cut)
+    small, warnings = small_peaks(peaks)
     count = len(small)
     if count < _FEWEST:
-        under = f"under {math.degrees(cut):.3g} degrees"
+        under = f"under {math.degrees(CUT):.3g} degrees"
         return too_few(count, _FEWEST, len(peaks.turned), under, warnings)
     measured = small.amplitude
     sign = math.copysign(1.0, measured[0]) * (-1.0) ** np.arange(count)
@@ -90,15 +90,12 @@ def from_peaks(peaks: Peaks, *, cut: float = CUT) -> Identification:
     inner[1:, 1:] = covariance[1:, 1:]
     values = np.array([period.w0, delta, theta_r, zero])
     slopes = jacobian(si, values, np.sqrt(np.diag(inner)) / 10)
-    outer = slopes @ inner @ slopes.T
-    names = ("w0", "c_over_m", "Tr", "offset")
-    estimates = si(values)
     return identified(
-        names,
-        estimates,
-        outer,
+        ("w0", "c_over_m", "Tr", "offset"),
+        si(values),
+        slopes @ inner @ slopes.T,
         used=(
-            f"peaks {small.index[0]} to {small.index[-1]} ({count}, under {math.degrees(cut):.3g} "
+            f"peaks {small.index[0]} to {small.index[-1]} ({count}, under {math.degrees(CUT):.3g} "
             "degrees), all of them, and their times"
         ),
         warnings=warnings,

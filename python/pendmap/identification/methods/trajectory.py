@@ -151,7 +151,9 @@ def fit_from_start(
     doubt = max(reading.doubt for reading in readings)
     fit = fit_runs(runs, model, free, sigma_doubt=doubt)
     if fit.widening > LACKING and any(reading.law for reading in readings):
-        readings = [dataclasses.replace(r, each=r.alike, law=None) for r in readings]
+        readings = [
+            dataclasses.replace(r, each=np.full_like(r.each, r.sigma), law=None) for r in readings
+        ]
         pairs = zip(runs, readings, strict=True)
         runs = [dataclasses.replace(run, sigma=reading.each) for run, reading in pairs]
         fit = fit_runs(runs, model, free, sigma_doubt=doubt)
