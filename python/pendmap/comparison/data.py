@@ -12,7 +12,7 @@ from pendmap.errors import InputError
 from pendmap.identification.readings import Reading, as_fit_run, reading_of_run
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from pendmap.identification.runs import FitRun
     from pendmap.records import Experiment, Run
@@ -36,7 +36,6 @@ FEWEST_BLOCKS: Final = 1000
 """Fewest blocks of a record; with fewer readings the integrator's own steps dominate the cost."""
 LEAST_OF_BLOCK: Final = 3  # Fewest readings of a block
 OF_ACCELERATION: Final = "computed from an acceleration, whose own errors are not among the effects"
-NEIGHBOURS: Final = 2  # Blocks on either side to which a parabola is fitted
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,17 +59,24 @@ class DataSplit:
         return any(run.drive is not None for run in self.fitted)
 
     @property
+    def whole(self) -> tuple[FitRun, ...]:
+        """Fitted records with the stretches held back."""
+        back = dict(zip(self.held_of, self.held, strict=True)) if self.inside else {}
+        return tuple(
+            dataclasses.replace(run, trusted=run.counted | back[of].counted) if of in back else run
+            for run, of in zip(self.fitted, self.fitted_of, strict=True)
+        )
+
+    @property
     def floors(self) -> tuple[float, ...]:
         """Share of rounding (white, variance ``count^2 / 12``) in each fitted run's noise."""
-        pairs = zip(self.fitted_of, self.fitted, strict=True)
-        # The rounding of a block's mean is that of one reading over the number of readings.
-        return tuple(
-            self.readings[k].count ** 2
-            / 12
-            / float(np.mean(np.square(run.sigma)))
-            / max(self.runs[k].time.size // run.time.size, 1)
-            for k, run in pairs
-        )
+        floors = []
+        for k, run in zip(self.fitted_of, self.fitted, strict=True):
+            # The rounding of a block's mean is that of one reading over the number of readings.
+            several = max(self.runs[k].time.size // run.time.size, 1)
+            variance = self.readings[k].count ** 2 / 12 / several
+            floors.append(variance / float(np.mean(np.square(run.sigma))))
+        return tuple(floors)
 
     @property
     def doubt(self) -> float:
@@ -143,10 +149,8 @@ def _middle_runs(every: Sequence[FitRun]) -> list[int]:
     free = [k for k, run in enumerate(every) if not run.forced]
     if len(forced) < FEWEST_FORCED:
         return []
-    held = [forced[len(forced) // 2]]
-    if len(free) >= FEWEST_FREE:
-        held.append(free[len(free) // 2])
-    return held
+    enough = (forced, free) if len(free) >= FEWEST_FREE else (forced,)
+    return [kind[len(kind) // 2] for kind in enough]
 
 
 def _hold_stretches(
@@ -159,16 +163,16 @@ def _hold_stretches(
     inside = not all(run.forced for run in every)
     fitted, held, held_of = [], [], []
     for k, run in enumerate(every):
+        stretches = [] if inside and run.forced else _stretches(run)
         back = np.zeros(run.time.shape, bool)
-        for a, b in [] if inside and run.forced else _stretches(run):
-            back[a:b] = run.counted[a:b]
-            if not inside:
-                held.append(samples_of(run, slice(a, b)))
-                held_of.append(k)
-        fitted.append(dataclasses.replace(run, trusted=run.counted & ~back))
+        for part in stretches:
+            back[part] = run.counted[part]
+        parts = [samples_of(run, part) for part in stretches]
         if inside and back.any():
-            held.append(dataclasses.replace(run, trusted=back))
-            held_of.append(k)
+            parts = [dataclasses.replace(run, trusted=back)]
+        fitted.append(dataclasses.replace(run, trusted=run.counted & ~back))
+        held += parts
+        held_of += [k] * len(parts)
     if not held:
         raise InputError(
             f"{experiment.path}: at least one run must have {LEAST} samples, "
@@ -178,26 +182,24 @@ def _hold_stretches(
     return DataSplit(experiment, runs, readings, tuple(fitted), tuple(held), *of, inside=inside)
 
 
-def _stretches(run: FitRun) -> list[tuple[int, int]]:
+def _stretches(run: FitRun) -> list[slice]:
     """Return the stretches held out of a run: fractions of its included samples."""
     samples = np.flatnonzero(run.counted)
     ends = [samples[[int(f * (samples.size - 1)) for f in part]].tolist() for part in HELD]
-    return [(a, b) for a, b in ends if b - a >= FEWEST]
+    return [slice(a, b) for a, b in ends if b - a >= FEWEST]
 
 
 def samples_of(run: FitRun, which: Mask | slice) -> FitRun:
     """Return a run with only some of its samples."""
     time, theta, sigma = run.time[which], run.theta[which], run.sigmas[which]
-    good = run.counted[which]
+    good, angle = run.counted[which], run.angle[which]
     part = dataclasses.replace(run, time=time, theta=theta, sigma=sigma, trusted=good)
-    return _with_angle(part, lambda angle: angle[which])
+    return _with_angle(part, angle)
 
 
-def _with_angle(run: FitRun, of: Callable[[Floats], Floats]) -> FitRun:
-    """Return a run with other samples of the angle that was computed from its readings, if any."""
-    if run.rod_sensor is None:
-        return run
-    sensor = dataclasses.replace(run.rod_sensor, angle=of(run.rod_sensor.angle))
+def _with_angle(run: FitRun, angle: Floats) -> FitRun:
+    """Return a run with another angle computed from its readings, if it is a sensor's."""
+    sensor = run.rod_sensor and dataclasses.replace(run.rod_sensor, angle=angle)
     return dataclasses.replace(run, rod_sensor=sensor)
 
 
@@ -205,9 +207,9 @@ def average_blocks(run: FitRun) -> FitRun:
     """Return a run with dense readings averaged over blocks, or else the run itself.
 
     With weights ``w``, one over the squared errors, ``sum(w x)/sum(w)`` at the mean time has the
-    error ``sum(w)^(-1/2)``. The bias ``var(t) a/2``, with the acceleration ``a`` of the parabola
-    through five blocks, is subtracted; the remaining error, of order ``T^4/60`` times the fourth
-    derivative in a block of length ``T``, is ``1e-6`` of a swing. Rounding to counts of ``q`` has
+    error ``sum(w)^(-1/2)``. The bias ``var(t) a/2``, with the second difference ``a`` of the
+    blocks, is subtracted; the remaining error, of order ``T^4/60`` times the fourth derivative in
+    a block of length ``T``, is ``1e-6`` of a swing. Rounding to counts of ``q`` has
     the error ``q / sqrt(12)``, that of the mean of a ramp over ``m`` counts ``q / (m sqrt(120))``.
     """
     weights = np.where(run.counted, run.sigmas**-2.0, 0.0)
@@ -219,7 +221,7 @@ def average_blocks(run: FitRun) -> FitRun:
         return run
     time, theta, weight, variance = _block_means(run.time, run.theta, weights, size)
     good = weight > 0
-    # Excluded blocks must not bend the parabolas of their neighbours.
+    # Excluded blocks must not bend the curve at their neighbours.
     known = np.where(good, theta, np.interp(time, time[good], theta[good]))
     theta = theta - 0.5 * variance * _curvature(time, known)
     sigma = np.where(good, weight, np.median(weight[good])) ** -0.5
@@ -228,7 +230,7 @@ def average_blocks(run: FitRun) -> FitRun:
         passed = math.sqrt(10) * (np.ptp(parts, axis=1) / run.count - 1)
         sigma = np.hypot(sigma, run.count / math.sqrt(12) / np.clip(passed, 1, math.sqrt(size)))
     means = dataclasses.replace(run, time=time, theta=theta, sigma=sigma, trusted=good, count=None)
-    return _with_angle(means, lambda _: angles[1])
+    return _with_angle(means, angles[1])
 
 
 def _block_means(
@@ -261,12 +263,7 @@ def _dense(time: Floats, theta: Floats, weight: Floats) -> bool:
 
 
 def _curvature(time: Floats, theta: Floats) -> Floats:
-    """Return the second derivative of the parabola fitted to each block and its neighbours."""
-    span = 2 * NEIGHBOURS + 1
-    first = np.clip(np.arange(time.size) - NEIGHBOURS, 0, time.size - span)
-    places = first[:, None] + np.arange(span)
-    t = time[places] - time[:, None]
-    scale = np.abs(t).max(axis=1)
-    basis = (t / scale[:, None])[..., None] ** np.arange(3)
-    fitted = np.linalg.pinv(basis) @ theta[places][..., None]
-    return np.asarray(2 * fitted[:, 2, 0] / scale**2, np.float64)
+    """Return second derivatives by central differences; at the ends those of the third block."""
+    bent = np.gradient(np.gradient(theta, time), time)
+    bent[:2], bent[-2:] = bent[2], bent[-3]
+    return bent

@@ -238,7 +238,7 @@ def as_json(comparison: Comparison) -> dict[str, Any]:
                 "rms": one.rms,
                 "start": dict(zip(("theta", "velocity"), one.start, strict=True)),
                 "quantities": [*_quantities(one)],
-                **(_free(one) if isinstance(one, RunComparison) else _forced(one)),
+                **_fields(one),
                 "findings": [finding.text for finding in one.run.findings],
             }
             for one in every
@@ -248,17 +248,14 @@ def as_json(comparison: Comparison) -> dict[str, Any]:
     }
 
 
-def _free(one: RunComparison) -> dict[str, Any]:
-    """Return the JSON fields of a free decay."""
-    return {
-        "period_rms_percent": one.errors and one.errors.period_rms,
-        "peak_rms_percent": one.errors and one.errors.peak_rms,
-        "table1_left_out": one.left_out or None,
-    }
-
-
-def _forced(one: ForcedComparison) -> dict[str, Any]:
-    """Return the JSON fields of a forced run."""
+def _fields(one: RunComparison | ForcedComparison) -> dict[str, Any]:
+    """Return the JSON fields of a free decay or of a forced run."""
+    if isinstance(one, RunComparison):
+        return {
+            "period_rms_percent": one.errors and one.errors.period_rms,
+            "peak_rms_percent": one.errors and one.errors.peak_rms,
+            "table1_left_out": one.left_out or None,
+        }
     drive, phase = one.run.drive, one.phase
     return {
         "windows": one.windows,

@@ -101,10 +101,9 @@ def compare_forecasts(data: DataSplit, base: Fits, best: Fits) -> tuple[Forecast
     """Return the forecast errors of free and of forced runs."""
     swing = math.tau / base.fitted.model.w0
     every = [s for place in range(len(data.held)) for s in _stretches(data, place, swing)]
-    forecasts = []
-    for kind in ("free", "forced"):
-        stretches = [s for s in every if s.run.forced == (kind == "forced")]
-        forecasts.append(_forecast(kind, stretches, base, best, swing))
+    kinds = {"free": [s for s in every if not s.run.forced]}
+    kinds["forced"] = [s for s in every if s.run.forced]
+    forecasts = (_forecast(kind, some, base, best, swing) for kind, some in kinds.items())
     return tuple(forecast for forecast in forecasts if forecast is not None)
 
 
@@ -232,23 +231,14 @@ def noise_rms(runs: Sequence[FitRun]) -> float:
 def compute_gap(data: DataSplit, base: Fits, best: Fits) -> Gap:
     """Return the root mean square residuals of a baseline and of a model."""
     rows = []
-    sides = (
-        (False, data.fitted, base.fitted, best.fitted),
-        (True, data.held, base.held, best.held),
-    )
-    for held_out, runs, before, after in sides:
-        for run, *left in zip(runs, before.residuals, after.residuals, strict=True):
+    for held_out, runs in enumerate((data.fitted, data.held)):
+        residuals = (fits[held_out].residuals for fits in (base, best))
+        for run, *left in zip(runs, *residuals, strict=True):
             rms_of = (_rms(run, residual) for residual in left)
-            rows.append(RunGap(run.name, held_out, noise_rms([run]), *rms_of))
-    return Gap(
-        noise_floor=noise_rms(data.fitted),
-        held_out_noise_floor=noise_rms(data.held),
-        before=base.fitted.rms,
-        after=best.fitted.rms,
-        held_out_before=base.held.rms,
-        held_out_after=best.held.rms,
-        by_run=tuple(rows),
-    )
+            rows.append(RunGap(run.name, bool(held_out), noise_rms([run]), *rms_of))
+    floors = noise_rms(data.fitted), noise_rms(data.held)
+    rms = base.fitted.rms, best.fitted.rms, base.held.rms, best.held.rms
+    return Gap(*floors, *rms, tuple(rows))
 
 
 def _rms(run: FitRun, residual: Floats) -> float:

@@ -183,17 +183,15 @@ class Cycle:
         Shifts are whole forcing periods and turns; the difference is infinite if ``n`` or ``w``
         differ.
         """
-        best = (math.inf, self)
         if (self.n, self.w) != (other.n, other.w):
-            return best
+            return math.inf, self
+        pairs = []
         for at in range(0, self.n * SAMPLES, SAMPLES):
             theta = np.concatenate([self.theta[at:], self.theta[:at] + math.tau * self.w])
             theta += math.tau * round(float(np.mean(other.theta - theta)) / math.tau)
-            apart = _rms(theta - other.theta)
-            if apart < best[0]:
-                velocity = np.roll(self.velocity, -at)
-                best = apart, dataclasses.replace(self, theta=theta, velocity=velocity)
-        return best
+            shifted = dataclasses.replace(self, theta=theta, velocity=np.roll(self.velocity, -at))
+            pairs.append((_rms(theta - other.theta), shifted))
+        return min(pairs, key=lambda pair: pair[0])
 
 
 def _rms(values: Floats) -> float:
@@ -280,19 +278,15 @@ def reached_cycles(
     first = math.ceil(begin / period) + math.ceil(periods)
     times = (first + np.arange(2 * LONGEST * SAMPLES + 1) / SAMPLES) * period
     readings = simulated(starts, np.concatenate([[begin], times]))
-    groups: list[tuple[Cycle, int]] = []
-    for row in readings[:, 1:]:
-        cycle = _closed(row, period)
-        if cycle is None:
-            continue
-        for k, (other, count) in enumerate(groups):
-            if cycle.nearest(other)[0] < _ONE:
-                groups[k] = other, count + 1
-                break
+    groups: list[list[Cycle]] = []
+    for cycle in filter(None, (_closed(row, period) for row in readings[:, 1:])):
+        same = next((group for group in groups if cycle.nearest(group[0])[0] < _ONE), None)
+        if same is None:
+            groups.append([cycle])
         else:
-            groups.append((cycle, 1))
-    groups.sort(key=lambda group: -group[1])
-    return tuple(Reached(cycle, count / len(readings)) for cycle, count in groups)
+            same.append(cycle)
+    groups.sort(key=len, reverse=True)
+    return tuple(Reached(group[0], len(group) / len(readings)) for group in groups)
 
 
 def _closed(row: Floats, period: float) -> Cycle | None:

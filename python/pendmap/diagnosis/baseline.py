@@ -66,18 +66,10 @@ def fit_baseline(
     rates = all(run.rod_sensor is not None for run in data.fitted)
     known = {*base.taken, *without, *([ZERO] if rates else [])}  # a rate has no zero of the angle
     added = [candidate for candidate in map(Candidate, CORE) if candidate.name not in known]
-    if not added:
-        return base, None
-    start = {candidate.free[0]: 0.0 for candidate in added}
-    core = best_of(
-        *(
-            fit_with_candidates(data, base, added, start, level=base.level, short=short)
-            for short in (False, True)
-        )
-    )
+    zeros = {candidate.free[0]: 0.0 for candidate in added}
+    core = _enlarged(data, base, added, (zeros, False), (zeros, True)) if added else None
     if core is None:
         return base, None
-    core = converge(data, core, core.level) or core
     reduced: FittedModel | None = core
     for candidate in added:
         reduced = reduced and drop_effect(data, reduced, candidate, core.level)
@@ -87,10 +79,33 @@ def fit_baseline(
     if before.fit.rms < POOR * noise:
         return base, core
     # Far above the noise scores are no guide: all effects of damping are fitted.
-    names = [name for name in DAMPING if name not in {*base.taken, *without}]
-    other = best_of(*(_fit_outright(data, base, name, rig) for name in names))
+    rough = {name: getattr(rig, name) for name in ("w0", *OPPOSING) if name in base.free}
+    fits = []
+    for name in (name for name in DAMPING if name not in known):
+        effect = Candidate(
+            name, {e.name: e.middle for e in library()[name].parameters if e.is_shape}
+        )
+        size = {effect.free[0]: effect.effect(rig.units, BEGIN).parameters[effect.size]}
+        fit = _enlarged(data, base, [effect], (size, True), (size | rough, True))
+        fits.append(fit and impose_physics(data, fit))
+    other = best_of(*fits)
     share = 0.0 if other is None else share_closed(before.fit.rms, other.fit.rms, noise)
     return base, other if share >= Thresholds().closes else core
+
+
+def _enlarged(
+    data: DataSplit,
+    base: FittedModel,
+    added: Sequence[Candidate],
+    *starts: tuple[dict[str, float], bool],
+) -> FittedModel | None:
+    """Return the best converged fit of a model with effects from starts, or from short windows."""
+    fits = (
+        fit_with_candidates(data, base, added, start, level=base.level, short=short)
+        for start, short in starts
+    )
+    best = best_of(*fits)
+    return best and (converge(data, best, best.level) or best)
 
 
 def fit_followed(
@@ -120,8 +135,8 @@ def in_windows(data: DataSplit, lost: Sequence[int]) -> DataSplit:
 
 def set_aside(data: DataSplit, lost: Sequence[int]) -> DataSplit | None:
     """Return records without the lost runs, with a finding about each; None if none remains."""
-    places = [k for k in range(len(data.fitted)) if k not in lost]
     out = {data.fitted_of[k] for k in lost}
+    places = [k for k, of in enumerate(data.fitted_of) if of not in out]
     held = [k for k, of in enumerate(data.held_of) if of not in out]
     if not places or not held:
         return None
@@ -139,20 +154,6 @@ def set_aside(data: DataSplit, lost: Sequence[int]) -> DataSplit | None:
     )
 
 
-def _fit_outright(data: DataSplit, base: FittedModel, name: str, begin: Rig) -> FittedModel | None:
-    """Return the baseline with an effect, fitted from short windows; None if it diverges."""
-    effect = Candidate(name, {e.name: e.middle for e in library()[name].parameters if e.is_shape})
-    size = {effect.free[0]: effect.effect(begin.units, BEGIN).parameters[effect.size]}
-    rough: dict[str, float] = {n: getattr(begin, n) for n in ("w0", *OPPOSING) if n in base.free}
-    fits = (
-        fit_with_candidates(data, base, [effect], size | known, level=base.level, short=True)
-        for known in ({}, rough)
-    )
-    fit = best_of(*fits)
-    fit = fit and converge(data, fit, fit.level)
-    return fit and impose_physics(data, fit)
-
-
 def lost_runs(data: DataSplit, fitted: FittedModel) -> list[int]:
     """Return the places of the runs that a model does not follow."""
     lost = []
@@ -164,11 +165,6 @@ def lost_runs(data: DataSplit, fitted: FittedModel) -> list[int]:
     return lost
 
 
-def follows(data: DataSplit, fitted: FittedModel) -> bool:
-    """Return whether a model follows all runs."""
-    return not lost_runs(data, fitted)
-
-
 @none_if_diverged
 def _through_all(data: DataSplit, start: Rig, free: list[str]) -> FittedModel | None:
     """Return a fit started from a fit to all samples if stretches are held back, else None.
@@ -177,13 +173,8 @@ def _through_all(data: DataSplit, start: Rig, free: list[str]) -> FittedModel | 
     """
     if not data.inside:
         return None
-    whole = list(data.fitted)
-    for run, k in zip(data.held, data.held_of, strict=True):
-        place = data.fitted_of.index(k)
-        fitted_run = whole[place]
-        if fitted_run.trusted is not None and run.trusted is not None:
-            whole[place] = dataclasses.replace(fitted_run, trusted=fitted_run.trusted | run.trusted)
-    return fit_again(data, fit_model(dataclasses.replace(data, fitted=tuple(whole)), start, free))
+    whole = dataclasses.replace(data, fitted=data.whole)
+    return fit_again(data, fit_model(whole, start, free))
 
 
 def _unfolded(model: Rig) -> Rig:

@@ -16,7 +16,7 @@ from pendmap.model.formula import Formula
 from pendmap.model.rig import own_name
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Mapping, Sequence
+    from collections.abc import Collection, Mapping, Sequence
 
     from pendmap.model import Rig
     from pendmap.model.effects import EffectDefinition, EffectParameter
@@ -229,16 +229,11 @@ def list_candidates(
     return candidates
 
 
-def _shapes(entry: EffectDefinition) -> Iterator[dict[str, float]]:
-    """Yield the shapes of an effect, with at most one scanned parameter."""
+def _shapes(entry: EffectDefinition) -> list[dict[str, float]]:
+    """Return the shapes of an effect, with at most one scanned parameter."""
     shapes = [e for e in entry.parameters if e.is_shape]
-    if not shapes:
-        yield {}
-        return
-    first, *others = shapes
-    fixed = {e.name: e.middle for e in others}
-    for value in _scan(first):
-        yield {first.name: float(value)} | fixed
+    fixed = {e.name: e.middle for e in shapes}
+    return [fixed | {e.name: float(value)} for e in shapes[:1] for value in _scan(e)] or [fixed]
 
 
 def _scan(entry: EffectParameter) -> Floats:

@@ -110,22 +110,20 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
     formulas = checked_own(effects)
     check_whole("max_effects", max_effects, 0, 6)
     moved = in_rounds(progress, _FITS) or (lambda _done, _total: None)
-    data = split_records(experiment)
     with _refuse_divergence(experiment):
-        data, base, core = fit_followed(data, model, without)
-    moved(1, 1)
-    most = 0 if "rigs-differ" in doubt_keys(experiment) else max_effects
-    state = State(data, base, thresholds or Thresholds(), most, without, formulas=formulas)
-    state.moved = lambda: moved(1, 1)
-    with _refuse_divergence(experiment):
+        data, base, core = fit_followed(split_records(experiment), model, without)
+        moved(1, 1)
+        most = 0 if "rigs-differ" in doubt_keys(experiment) else max_effects
+        state = State(data, base, thresholds or Thresholds(), most, without, formulas=formulas)
+        state.moved = lambda: moved(1, 1)
         last = search(state, core)
-    instants = [last.fit[name] for c in last.chosen if c.once for name in c.adapted]
-    shorter = without_hands(experiment, instants, math.tau / last.fit["w0"])
-    if shorter is not None:
-        same: dict[str, Any] = {"effects": effects, "thresholds": thresholds, "progress": progress}
-        return diagnose(shorter, model=model, max_effects=most, without=without, **same)
-    with _refuse_divergence(experiment):
-        last = last if last.chosen or most == 0 else state.physical_core(core) or last
+        instants = [last.fit[name] for c in last.chosen if c.once for name in c.adapted]
+        shorter = without_hands(experiment, instants, math.tau / last.fit["w0"])
+        if shorter is not None:
+            same: dict[str, Any] = {"effects": effects, "thresholds": thresholds}
+            same |= {"progress": progress, "max_effects": most, "without": without}
+            return diagnose(shorter, model=model, **same)
+        last = state.with_core(last, core)
         begin = state.scored(state.begun)
         if not doubt_keys(experiment, *data.runs) & UNIT_FINDINGS:
             refuse_astray(experiment.path, data.fitted, last.fit)

@@ -31,19 +31,11 @@ Found = TypeVar("Found")
 
 LITTLE: Final = 0.05
 """Promised fall of the sum of squares, over one independent reading's, below which a fit ends."""
-
+EXACT: Final = 1e-3  # The same of a converged fit
 LEAST_LEVEL: Final = 0.5  # Least variance of noise over the stated variance of its readings
-
-EXACT: Final = 1e-3
-"""Promised fall of the sum of squares, over one independent reading's, of a converged fit."""
-
 FEW_STEPS: Final = 12  # Most steps of a candidate's fit; the right candidate needs about five
-
 SIZED_STEPS: Final = 5  # Most steps of the fit of a size before its shape is fitted
-
 NEAR_STEPS: Final = 6  # Most steps of a fit after an exponent was moved
-
-
 STRETCH: Final = 2.0  # Factor by which a width may leave its typical range
 
 
@@ -296,20 +288,14 @@ def _possible(data: DataSplit, fitted: FittedModel, candidate: Candidate) -> boo
     span = end - min(run.lab_time_s + float(run.time[0]) for run in data.fitted)
     entries = {entry.name: entry for entry in candidate.definition.parameters}
     w0 = fitted.fit.model.w0
+    ranges = {"time constant": (math.tau / w0, span), "instant": (end - span, end)}
     for name in candidate.shape:
         estimate, entry = estimates.get(f"{candidate.name}.{name}"), entries[name]
-        if estimate is None:
-            continue
-        low, high = -math.inf, math.inf
-        if entry.role == "time constant":
-            low, high = math.tau / w0, span
-        elif entry.role == "instant":
-            low, high = end - span, end
-        elif entry.role == "width":
-            low, high = entry.typical
+        low, high = ranges.get(entry.role, (-math.inf, math.inf))
+        if entry.role == "width":
             unit = w0**entry.power_of_w0
-            low, high = low / STRETCH * unit, high * STRETCH * unit
-        if not low <= estimate.value <= high:
+            low, high = entry.typical[0] / STRETCH * unit, entry.typical[1] * STRETCH * unit
+        if estimate is not None and not low <= estimate.value <= high:
             return False
     return _drains(fitted, candidate, entries[candidate.size], end)
 

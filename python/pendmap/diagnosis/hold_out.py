@@ -76,11 +76,7 @@ def hold_out_losses(
         both = (*data.fitted, *data.held)
         whole = _chi2(both, fitted, (*fitted.fit.windows, *shifted), level, known)
         return (whole - fitted.chi2,)
-    windows, back = fitted.fit.windows, dict(zip(data.held_of, data.held, strict=True))
-    runs = tuple(
-        dataclasses.replace(run, trusted=run.counted | back[of].counted) if of in back else run
-        for run, of in zip(data.fitted, data.fitted_of, strict=True)
-    )
+    windows, runs = fitted.fit.windows, data.whole
     whole = _chi2(runs, fitted, windows, level)
     lost = [
         whole - _chi2([_without(run, k) for run in runs], fitted, windows, level)

@@ -52,9 +52,7 @@ class NamedEffect:
     @property
     def reaches_0(self) -> bool:
         """Whether the interval of its size contains 0, or values below where it opposes."""
-        size = next(
-            parameter.name for parameter in self.definition.parameters if parameter.role == "size"
-        )
+        size = next(entry.name for entry in self.definition.parameters if entry.role == "size")
         low, high = self.ci95.get(size, (-math.inf, math.inf))
         return low <= 0 <= high or (self.definition.opposing == size and low <= 0)
 
@@ -75,15 +73,10 @@ def name_effects(
         reasons, "effects.ci95", lambda: profile_intervals(data, best.fitted), none
     )
     # Frequencies or instants that the residuals show without the effect.
-    sought = {
-        c.name: [
-            score
-            for score in state.scores(state.leave_out(best.fitted, c)).scores
-            if score.candidate.name == c.name
-        ]
-        for c in best.fitted.chosen
-        if c.sought
-    }
+    sought = {}
+    for c in (c for c in best.fitted.chosen if c.sought):
+        scores = state.scores(state.leave_out(best.fitted, c)).scores
+        sought[c.name] = [score for score in scores if score.candidate.name == c.name]
     others = find_equivalents(data, best.fitted, sought)
     untimed = any(one.what == "lab-time-missing" for one in data.experiment.findings)
     named = []
@@ -127,9 +120,8 @@ def effect_values(
     estimates = best.fitted.fit.estimates
     parameter = own_name(candidate.name)
     if parameter is not None:
-        return {candidate.size: estimates[parameter].value}, {
-            candidate.size: estimates[parameter].stderr or 0
-        }
+        size, estimate = candidate.size, estimates[parameter]
+        return {size: estimate.value}, {size: estimate.stderr or 0}
     effect = next(e for e in best.fitted.fit.model.effects if e.name == candidate.name)
     errors = {
         name: estimates[key].stderr or math.inf
@@ -137,9 +129,8 @@ def effect_values(
         if (key := f"{effect.name}.{name}") in estimates
     }
     values = dict(effect.parameters)
-    if candidate.phase is not None and values[candidate.size] < 0:
-        values[candidate.size] = -values[candidate.size]
-        values[candidate.phase] += math.pi
     if candidate.phase is not None:
-        values[candidate.phase] = math.remainder(values[candidate.phase], math.tau)
+        turned = values[candidate.phase] + math.pi * (values[candidate.size] < 0)
+        values[candidate.phase] = math.remainder(turned, math.tau)
+        values[candidate.size] = abs(values[candidate.size])
     return values, errors

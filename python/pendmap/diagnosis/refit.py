@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from typing import TYPE_CHECKING, Final
 
@@ -29,11 +30,7 @@ KICK: Final = 1e-3
 """Initial size of a candidate over its score's step: the full step diverges far from the fit, and a
 phase needs a size above 0."""
 
-FAINT: Final = 5.0
-"""Size of an effect, in standard errors, up to which covariance gives the start without it."""
-
 MIRROR_STEPS: Final = 6  # Most steps of a fit from a mirrored place
-
 EQUIVALENT_STEPS: Final = 25  # Most steps of a fit from another shape, tested for equivalence
 
 Key = frozenset[tuple[str, tuple[tuple[str, float], ...]]]
@@ -67,20 +64,12 @@ def refit_with(  # noqa: PLR0913, PLR0917 (what is fitted, and what decides)
     step = {name: value for score in selected for name, value in score.start.items()}
     sizes = {candidate.free[0] for candidate in added}
 
-    def fit(
-        added: Sequence[Candidate],
-        step: dict[str, float],
-        *,
-        kick: bool = False,
-        short: bool = False,
-    ) -> FittedModel | None:
-        start = {name: KICK * v if kick and name in sizes else v for name, v in step.items()}
-        return fit_with_candidates(data, fitted, added, start, level=level, short=short)
-
-    best = fit(added, step, kick=True)
-    for k in _other_shapes(scores, places, thresholds):
-        other = scores.scores[k]
-        best = best_of(best, fit([other.candidate], other.start, kick=True))
+    fit = functools.partial(fit_with_candidates, data, fitted, level=level)
+    others = [scores.scores[k] for k in _other_shapes(scores, places, thresholds)]
+    best: FittedModel | None = None
+    for one, begin in [(added, step), *(([other.candidate], other.start) for other in others)]:
+        kick = {name: KICK * v if name in sizes else v for name, v in begin.items()}
+        best = best_of(best, fit(one, kick))
     promised = thresholds.short * scores.together(places)
     if best is None or fitted.chi2 - best.chi2 < promised:
         best = best_of(best, fit(added, step))
@@ -119,30 +108,16 @@ def drop_effect(
     level: float,
     target: float = math.inf,
 ) -> FittedModel | None:
-    """Return a model without one of its effects; None if the fit fails or is far above ``target``.
+    """Return a model without one of its effects, fitted from the present motion.
 
-    The fit starts at the fitted motion, the other parameters moved by the covariance if the effect
-    is small.
+    None if the fit fails or is far above ``target``.
     """
-    size = dropped.free[0]
-    start = fitted.start_without([size]) if _is_faint(fitted, dropped) else fitted.start
-    start = dict.fromkeys(fitted.zeroed, 0.0) | start
-    least, freed = LITTLE * level, fitted.zeroed
+    start = dict.fromkeys(fitted.zeroed, 0.0) | fitted.start
+    least, freed, size = LITTLE * level, fitted.zeroed, dropped.free[0]
     reduced = fit_without(data, fitted, size, start, least=least, target=target, freed=freed)
     if reduced is None or reduced.fit.given_up:
         return None
     return impose_physics(data, reduced, target)
-
-
-def _is_faint(fitted: FittedModel, dropped: Candidate) -> bool:
-    """Return whether the size of an effect is within a few standard errors of 0."""
-    size = dropped.free[0]
-    if size not in fitted.fit.names or dropped.phase is not None:
-        return False
-    error = fitted.fit.estimates[size].stderr
-    if error is None or not 0 < error < math.inf:
-        return False
-    return abs(fitted.start[size]) <= FAINT * error
 
 
 def add_effects(
@@ -227,13 +202,10 @@ def _fit_from(
 ) -> FittedModel | None:
     """Return the fit from another start of an effect; None if it diverges."""
     values = {key.rpartition(".")[2]: value for key, value in start.items()}
-    effects = tuple(
-        dataclasses.replace(e, parameters={**e.parameters, **values})
-        if e.name == candidate.name
-        else e
-        for e in fitted.fit.model.effects
-    )
-    model = dataclasses.replace(fitted.fit.model, effects=effects)
+    effects = {effect.name: effect for effect in fitted.fit.model.effects}
+    moved = {**effects[candidate.name].parameters, **values}
+    effects[candidate.name] = dataclasses.replace(effects[candidate.name], parameters=moved)
+    model = dataclasses.replace(fitted.fit.model, effects=tuple(effects.values()))
     return fit_again(data, fitted, model=model, start=fitted.start | dict(start), steps=steps)
 
 

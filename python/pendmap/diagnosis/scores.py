@@ -145,15 +145,13 @@ def score_candidates(
     gram[unseen], gram[:, unseen], pull[unseen] = 0.0, 0.0, 0.0
     units = np.where(unseen, 1.0, np.sqrt(np.diag(gram)))
     gram, pull, sizes = gram / np.outer(units, units), pull / units, sizes * units
-    scores, where, first = [], [], 0
+    scores, where, left = [], [], iter(range(pull.size))
     for candidate in every:
-        indices = list(range(first, first + len(candidate.free)))
-        first += len(indices)
+        indices = list(itertools.islice(left, len(candidate.free)))
         where.append(indices)
         faint = candidate.effect(fitted.fit.model.units).parameters.get(candidate.size, 0.0)
-        scores.append(
-            _scored(candidate, gram[np.ix_(indices, indices)], pull[indices], sizes[indices], faint)
-        )
+        block = gram[np.ix_(indices, indices)]
+        scores.append(_scored(candidate, block, pull[indices], sizes[indices], faint))
     return Scores(tuple(scores), tuple(where), gram, pull)
 
 
@@ -197,8 +195,7 @@ def _located(
     candidates: list[list[Candidate]] = []
     responses = calm_responses(data.fitted, windows, model.c_over_m) if pool else []
     for one, *_ in pool if responses else ():
-        scanned = one.sought
-        if scanned is None:
+        if (scanned := one.sought) is None:
             continue
         unit = model.w0**scanned.power_of_w0
         if scanned.role == "frequency":
@@ -242,7 +239,10 @@ def _scored(candidate: Candidate, gram: Floats, pull: Floats, sizes: Floats, fai
         }
         scale[1] /= faint
     information = float(np.linalg.eigvalsh(gram * np.outer(scale, scale))[0])
-    return Score(candidate, _gain(gram, pull), start, max(information, 0.0))
+    # What opposes the motion gains nothing with a size below 0.
+    drives = candidate.definition.opposing is not None and start[candidate.free[0]] < 0
+    gain = 0.0 if drives else _gain(gram, pull)
+    return Score(candidate, gain, start, max(information, 0.0))
 
 
 def _gain(gram: Floats, pull: Floats) -> float:

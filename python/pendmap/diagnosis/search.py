@@ -19,7 +19,7 @@ import itertools
 import math
 from typing import TYPE_CHECKING, Final
 
-from pendmap.diagnosis.baseline import follows
+from pendmap.diagnosis.baseline import lost_runs
 from pendmap.diagnosis.refit import key_of
 from pendmap.diagnosis.state import Attempt
 
@@ -40,20 +40,12 @@ def search(state: State, core: FittedModel | None) -> FittedModel:
     core = best
     best = prune_effects(state, cheapest_start(state, core))
     if core.chosen and state.most > 0:
-        state.attempts.append(
-            Attempt(
-                core.names,
-                {},
-                (state.base.chi2 - core.chi2) / state.level,
-                state.cost(state.base) - state.cost(core),
-                None,
-                bool(best.chosen),
-                0,
-            )
-        )
+        gain = (state.base.chi2 - core.chi2) / state.level
+        fall = state.cost(state.base) - state.cost(core)
+        state.attempts.append(Attempt(core.names, {}, gain, fall, None, bool(best.chosen), 0))
     # Alternatives of the core's effects are searched at models without these effects.
     reduced = [state.leave_out(best, candidate) for candidate in best.chosen]
-    starts = [model for model in reduced if follows(state.data, model)]
+    starts = [model for model in reduced if not lost_runs(state.data, model)]
     best_known: dict[Key, float] = {}
     # A set of effects is enlarged again only from a clearly better fit, as effects may be dropped.
     margin = state.thresholds.alike
@@ -162,17 +154,13 @@ def _attempt(
     gains = state.remaining(full) >= 0 and state.is_significant(best, full)
     accepted = gains and state.keeps_hold_out(best, full)
     scores, losses = state.scores(reduced), state.hold_out_losses
-    added = [scores.scores[k].candidate for k in places]
+    names = tuple(scores.name(k) for k in places)
+    shape = full.shape_of(full.chosen[-len(names)])
+    score = scores.together(places) / state.level
+    fall = state.cost(reduced) - state.cost(full)
     pairs = zip(losses(reduced), losses(full), strict=False) if gains else ()
-    return Attempt(
-        tuple(candidate.name for candidate in added),
-        full.shape_of(full.chosen[-len(added)]),
-        scores.together(places) / state.level,
-        state.cost(reduced) - state.cost(full),
-        min(((before - after) / state.level for before, after in pairs), default=None),
-        accepted,
-        len(reduced.chosen),
-    )
+    held = min(((before - after) / state.level for before, after in pairs), default=None)
+    return Attempt(names, shape, score, fall, held, accepted, len(reduced.chosen))
 
 
 def prune_effects(state: State, best: FittedModel) -> FittedModel:

@@ -19,7 +19,7 @@ from pendmap.diagnosis.fitted_model import (
 )
 from pendmap.diagnosis.hold_out import HoldOut, evaluate_hold_out, hold_out_losses
 from pendmap.diagnosis.refit import add_effects, drop_effect, key_of, refit_with
-from pendmap.diagnosis.scores import Score, Scores, score_candidates
+from pendmap.diagnosis.scores import Scores, score_candidates
 from pendmap.errors import FitDiverged
 from pendmap.identification.experiment import CLOSED, MISSES
 
@@ -59,18 +59,10 @@ class Attempt:
     score: float  # Gain promised by the score, in independent readings
     # Fall of the cost: sum of squares in independent readings with Schwarz's penalty.
     bic_gain: float
-    held_out_gain: (
-        float | None
-    )  # Least fall on a held-out set, in independent readings; None if unused
+    # Least fall on a held-out set, in independent readings; None if unused.
+    held_out_gain: float | None
     accepted: bool  # Whether the search continued with them
     stage: int  # Number of effects before they were added
-
-
-def _opposing(score: Score) -> Score:
-    """Return a score, without gain if an effect that opposes the motion is expected below 0."""
-    size = next(iter(score.start.values()), 0.0)
-    drives = score.candidate.definition.opposing is not None and size < 0
-    return dataclasses.replace(score, gain=0.0) if drives else score
 
 
 class State:
@@ -98,7 +90,8 @@ class State:
     def _begin(self, base: FittedModel) -> None:
         """Discard all fits except that of a baseline."""
         self.base = self._best = base
-        self._begun: FittedModel | None = None
+        # The baseline within physical limits; as it is where no such fit is found.
+        self.begun = impose_physics(self.data, base) or base
         self._fits: dict[Key, FittedModel] = {key_of(()): base}
         self._reduced: set[tuple[Key, str]] = set()
         self._refits: dict[tuple[FittedModel, Key], FittedModel | None] = {}
@@ -135,13 +128,6 @@ class State:
         return impose_physics(self.data, fit) or fit
 
     @property
-    def begun(self) -> FittedModel:
-        """The baseline within physical limits; as it is where no such fit is found."""
-        if self._begun is None:
-            self._begun = impose_physics(self.data, self.base) or self.base
-        return self._begun
-
-    @property
     def level(self) -> float:
         """Sum of squares of one independent reading, from the best model's residuals."""
         return self._best.level
@@ -173,10 +159,7 @@ class State:
         """Return the scores of all candidates at a fit."""
         if fitted not in self._scores:
             self.moved()
-            scores = score_candidates(self.data, fitted, self._candidates(fitted))
-            self._scores[fitted] = dataclasses.replace(
-                scores, scores=tuple(map(_opposing, scores.scores))
-            )
+            self._scores[fitted] = score_candidates(self.data, fitted, self._candidates(fitted))
         return self._scores[fitted]
 
     def _candidates(self, fitted: FittedModel) -> list[list[Candidate]]:
@@ -238,22 +221,32 @@ class State:
             if fitted is best or self._loses_at_most(most, best, fitted)
         )
 
-    def physical_core(self, core: FittedModel | None) -> FittedModel | None:
-        """Return the smallest part of the core that closes half of the gap; None without one.
+    def with_core(self, last: FittedModel, core: FittedModel | None) -> FittedModel:
+        """Return a model without effects with that of the core if it halves the squared gap.
 
-        Coloured residuals have too few independent readings for a significant gain; instead no
-        held-out set may be predicted worse.
+        Coloured residuals have too few independent readings for a significant gain: instead the
+        gap without the effect must be halved in the fitted records and in those held back.
         """
-        full = None if core is None else self.remember(self._fit_again(core))
-        if full is None or self.begun.fit.rms < MISSES * self.noise:
-            return None
-        parts = [*(self.leave_out(full, candidate) for candidate in full.chosen), full]
-        best = self.begun
-        for part in sorted(parts, key=lambda t: len(t.chosen)):
-            closed = share_closed(best.fit.rms, part.fit.rms, self.noise)
-            if part.chosen and closed >= 1 - CLOSED and self.keeps_hold_out(best, part):
-                best = part
-        return best if best.chosen else None
+        gap = self.begun.fit.rms > MISSES * self.noise and 0 < self.most == self.remaining(last)
+        full = self.remember(self._fit_again(core)) if core is not None and gap else None
+        if full is None:
+            return last
+        for part in (*(self.leave_out(full, candidate) for candidate in full.chosen), full):
+            effect = next((c for c in part.chosen if c.name != ZERO), None)
+            if effect is not None and {*last.names} <= {*part.names}:
+                less = self.leave_out(part, effect)
+                if self._halves_gap(less if less.chosen else self.begun, part):
+                    return part
+        return last
+
+    def _halves_gap(self, reduced: FittedModel, full: FittedModel) -> bool:
+        """Return whether a model halves another's squared gap in all records."""
+        before, after = self.hold_out(reduced), self.hold_out(full)
+        if before is None or after is None:
+            return False
+        held = share_closed(before.fit.rms, after.fit.rms, noise_rms(self.records.held))
+        fitted = share_closed(reduced.fit.rms, full.fit.rms, self.noise)
+        return min(held, fitted) >= 1 - CLOSED
 
     def hold_out(self, fitted: FittedModel) -> HoldOut | None:
         """Return the hold-out evaluation of a model; None if it diverges."""

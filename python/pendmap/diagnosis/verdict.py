@@ -111,35 +111,24 @@ def compare_alternatives(state: State, best: FittedModel, candidate: Candidate) 
             reached = (reduced.chi2 - fit.chi2) / level
         more = score.candidate.count > candidate.count
         chosen = score.candidate.choice_gain - candidate.choice_gain
-        behind = gain - reached + chosen
-        contains = (
-            more and scores.likeness(place, k) > CONTAINS and behind > -state.thresholds.alike
-        )
-        alike = behind < state.thresholds.alike
+        behind, near = gain - reached + chosen, state.thresholds.alike
+        contains = more and scores.likeness(place, k) > CONTAINS and behind > -near
+        alike = behind < near
         if fit is not None and not alike and not candidate.once:
             # The accepted effect must be better without any one run, or any third of a single run.
             parts = _by_part(fit) - _by_part(best)
             alike = bool(parts.sum() - parts.max() + chosen * level < 0)
-        alternatives.append(
-            Alternative(
-                score.candidate,
-                reached,
-                behind,
-                1.0 - reached / gain if gain > 0 else 0.0,
-                fit is not None,
-                contains,
-                alike,
-            )
-        )
+        apart, refitted = 1.0 - reached / gain if gain > 0 else 0.0, fit is not None
+        other = Alternative(score.candidate, reached, behind, apart, refitted, contains, alike)
+        alternatives.append(other)
     alternatives.sort(key=lambda r: r.behind)
     return Identifiability(candidate, gain, state.closed(reduced, best), tuple(alternatives))
 
 
 def _by_part(fitted: FittedModel) -> np.ndarray:
     """Return the sum of squares of each run, or of each third of a single one."""
-    sums = []
-    for run, white in zip(fitted.runs, fitted.fit.white, strict=True):
-        sums.append(white[np.isfinite(white) & run.counted] ** 2)
+    pairs = zip(fitted.runs, fitted.fit.white, strict=True)
+    sums = [white[np.isfinite(white) & run.counted] ** 2 for run, white in pairs]
     parts = sums if len(sums) > 1 else np.array_split(sums[0], THIRDS)
     return np.array([float(np.sum(part)) for part in parts])
 
@@ -222,23 +211,14 @@ def decide_verdict(state: State, best: ScoredModel, runs: RunByRun, chance: floa
         most = limits.forecast * max(fitted.chi2 / degrees, scatter)
         readings = max(held.degrees / fitted.level, 1.0)
         held_out = float(chdtrc(readings, held.chi2 / most / fitted.level))
-    others = {
-        "torque": chance,
-        "slow": noise.chance,
-        "runs": runs.chance,
-        "held_out": held_out,
-    }
+    others = {"torque": chance, "slow": noise.chance, "runs": runs.chance, "held_out": held_out}
     form = assess_fit(state.scores(fitted), noise.chance_of, others)
     chance_left = form.chance if ratio <= allowed else 0.0
     closed = state.closed(state.base, fitted)
     slight = closed >= WHOLE and fitted.fit.rms <= SLIGHT * state.noise
     lacks = chance_left < limits.rest and not slight
-    identified = tuple(
-        sorted(
-            (compare_alternatives(state, fitted, candidate) for candidate in fitted.chosen),
-            key=lambda s: -s.gain,
-        )
-    )
+    compared = [compare_alternatives(state, fitted, candidate) for candidate in fitted.chosen]
+    identified = tuple(sorted(compared, key=lambda s: -s.gain))
     sure = probabilities(chance_left, [s.gain for s in identified])
     verdict: Verdict
     if not identified:
@@ -249,19 +229,8 @@ def decide_verdict(state: State, best: ScoredModel, runs: RunByRun, chance: floa
         verdict = "ambiguous"
     else:
         verdict = "named"
-    return Assessment(
-        verdict,
-        identified,
-        left,
-        ratio,
-        allowed,
-        held.chi2 / max(held.degrees, 1),
-        closed,
-        runs.uneven,
-        form,
-        sure,
-        limits,
-    )
+    residuals = left, ratio, allowed, held.chi2 / max(held.degrees, 1), closed, runs.uneven
+    return Assessment(verdict, identified, *residuals, form, sure, limits)
 
 
 def features(chance: float, gains: Sequence[float]) -> list[tuple[float, ...]]:

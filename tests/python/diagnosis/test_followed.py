@@ -59,7 +59,7 @@ def test_drag_is_named_from_a_gyroscope() -> None:
 
 def test_the_torque_that_rates_show_is_that_of_angles() -> None:
     ends = []
-    for run in (run_of(decay(2.2, drag=0.03)), of_rate(decay(2.2, drag=0.03))):
+    for run in (run_of(decay(2.2, drag=0.1)), of_rate(decay(2.2, drag=0.1))):
         data = split_records(experiment(run))
         base, _ = fit_baseline(data, without=("quadratic_drag",))
         rows = residual_torque(data.fitted, base.fit, base.noise).rows["velocity"]
@@ -114,10 +114,33 @@ def test_the_core_that_closes_half_of_the_gap_is_not_unknown() -> None:
     """Disturbances as slow as the swings leave few independent readings."""
     rng, runs = np.random.default_rng(2), []
     for k, start in enumerate((1.0, 0.7, 0.85)):
-        slow = lfilter([1.0], [1.0, -1.96, 0.97], rng.standard_normal(TIME.size))
-        theta = decay(start, drag=1.1) + 8e-3 * slow / np.std(slow)
-        runs.append(run_of(theta, str(k), seed=k))
+        slow = lfilter([1.0], [1.0, -1.9549, 0.9702], rng.standard_normal(700))[500:]
+        theta = decay(start, drag=0.12)[:200] + 0.01 * slow / np.std(slow)
+        run = run_of(theta, str(k), seed=k)
+        runs.append(dataclasses.replace(run, time=TIME[:200]))
     result = pendmap.diagnose(runs, max_effects=1)
+    assert not any(attempt.accepted for attempt in result.attempts)
     assert result.verdict == "partial"
     assert [effect.name for effect in result.effects] == ["quadratic_drag"]
     assert result.effects[0].approximate
+
+
+def test_a_run_of_another_rig_is_set_aside_and_said() -> None:
+    starts = {"0": 1.5, "1": 0.9, "other": 1.4}
+    runs = [run_of(decay(a, w0=4.4 if k == "other" else 6.2), k) for k, a in starts.items()]
+    result = pendmap.diagnose(runs, max_effects=0)
+    assert [result.data.runs[k].name for k in result.data.fitted_of] == ["0", "1"]
+    assert result.verdict == "none"
+    assert any("no model follows it" in line for line in result.text_parts()[1])
+
+
+def test_far_above_the_noise_damping_effects_are_fitted_outright() -> None:
+    cubic = pendmap.Effect("cubic_damping", {"k3": 0.02})
+    rig = pendmap.Rig(6.2, 0.05, 0.05, effects=(cubic,))
+    theta = pendmap.simulate(rig, theta=2.2, velocity=0.0, t_eval=TIME).theta.values
+    run = run_of(theta, noise=5e-5)
+    _, core = fit_baseline(split_records(experiment(run)))
+    assert core is not None
+    assert core.names == ("power_law_drag",)
+    result = pendmap.diagnose(run, max_effects=1)
+    assert (result.verdict, [e.name for e in result.effects]) == ("named", ["cubic_damping"])
