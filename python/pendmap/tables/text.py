@@ -314,7 +314,8 @@ def _parts(line: str, columns: Sequence[Column], form: _Form) -> list[str]:
     if len(names) == width - 1 > 1 and (first.kind == "text" or numbered):
         return ["", *names]  # as R numbers the rows
     # Columns at the end may be empty, and settings may stand beside the names.
-    fits = len(parts) >= width and (len(names) <= form.width or form.delimiter != " ")
+    settings = form.delimiter in "\t;|" or (form.delimiter == "," and width > 1)
+    fits = len(parts) >= width and (len(names) <= form.width or settings)
     return [part.strip() for part in parts[:width]] if fits else []
 
 
