@@ -37,10 +37,7 @@ LINES: Final = ((0, 2), (2, 5), (5, 8), (8, 10))  # Quantities of each line of t
 
 
 def swing_amplitude(curve: Floats, w0: float) -> Floats:
-    """Return the amplitude of swings with the energy of angle and velocity, shape (2, n), rad.
-
-    Of a rotation it is above pi.
-    """
+    """Return amplitudes, rad, at the energy of angle and velocity, (2, n); rotations: above pi."""
     theta, velocity = curve
     energy = 1 - np.cos(theta) + 0.5 * (velocity / w0) ** 2
     swing = np.arccos(np.clip(1 - energy, -1, 1))

@@ -83,8 +83,6 @@ class IdentificationReport(FitResult):
     def __repr__(self) -> str:
         best = "no method gives a model" if self.sound is None else self.sound.short
         more = f"; {counted(len(self.methods), 'method')}, {counted(len(self.runs), 'run')}"
-        if self.warnings:
-            more += f"; {counted(len(self.warnings), 'warning')}"
         return f"<IdentificationReport {self.run.name}: {best}{more}>"
 
     def text_parts(self) -> tuple[list[tuple[list[str], list[list[str]]]], list[str]]:
@@ -114,12 +112,13 @@ class IdentificationReport(FitResult):
         fit, _, runs = self.followed()
         parts = []
         for run, left in zip(runs, fit.residuals, strict=True):
-            gain, unit = 1.0, "rad"
-            if run.rod_sensor is not None:
-                gain, unit = run.rod_sensor.gain, run.rod_sensor.unit.replace("/", "_per_")
+            sensor = run.rod_sensor
+            gain, unit = (1.0, "rad") if sensor is None else (sensor.gain, sensor.unit)
             residual = np.where(run.trusted, gain * left, np.nan)
             columns = {"reading": run.read, "fit": run.read - residual, "residual": residual}
-            named = {f"{name}_{unit}": values for name, values in columns.items()}
+            named = {
+                f"{name}_{unit.replace('/', '_per_')}": values for name, values in columns.items()
+            }
             parts.append(pd.DataFrame({"time_s": run.time, **named, "run": run.name}))
         return pd.concat(parts, ignore_index=True)
 

@@ -198,8 +198,7 @@ class JointFit:
     @property
     def given(self) -> list[FitRun]:
         """The runs as they are fitted."""
-        pairs = zip(self.runs, self.readings, strict=True)
-        return [as_fit_run(run, reading) for run, reading in pairs]
+        return [as_fit_run(*pair) for pair in zip(self.runs, self.readings, strict=True)]
 
     @property
     def noise(self) -> float:
