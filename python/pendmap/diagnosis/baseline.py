@@ -37,8 +37,6 @@ if TYPE_CHECKING:
 LOST: Final = 0.1  # Residual of a run, over its swing, above which a fit does not follow it
 POOR: Final = 20.0  # Residual over the noise above which each effect of damping is fitted
 WINDOWS: Final = 4  # Windows in which a run is fitted that is lost as one motion
-DAMPING: Final = ("cubic_damping", "power_law_drag", "eddy_brake", "load_dependent_friction")
-"""Effects that oppose the motion at any place and time, besides that of the core."""
 BEGIN: Final = 0.01  # Nondimensional size at which a fit of an effect of damping begins
 
 
@@ -81,10 +79,11 @@ def fit_baseline(
     # Far above the noise scores are no guide: all effects of damping are fitted.
     rough = {name: getattr(rig, name) for name in ("w0", *OPPOSING) if name in base.free}
     fits = []
-    for name in (name for name in DAMPING if name not in known):
-        effect = Candidate(
-            name, {e.name: e.middle for e in library()[name].parameters if e.is_shape}
-        )
+    for name, law in library().items():
+        always = law.family == "damping" and law.opposing is not None and law.mappable == "yes"
+        if not always or own_name(name) or name in {*known, *CORE}:
+            continue
+        effect = Candidate(name, {e.name: e.middle for e in law.parameters if e.is_shape})
         size = {effect.free[0]: effect.effect(rig.units, BEGIN).parameters[effect.size]}
         fit = _enlarged(data, base, [effect], (size, True), (size | rough, True))
         fits.append(fit and impose_physics(data, fit))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.formatting import Estimate, interval, written
+from pendmap.formatting import Estimate, interval
 from pendmap.model.labels import unit_of
 from pendmap.signal.robust import Z95
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from pendmap.model.effects import EffectDefinition
 
 ROWS: Final = 8  # Number of rows of the table
-HEAD: Final = ["effect", "alone", "last", "BIC", "size, 95 %", "p"]
+HEAD: Final = ["effect", "alone", "last", "BIC", "95 % interval", "p"]
 NOTE: Final = (
     "alone, last: share of the squared gap that an effect promises to close by itself, and closes "
     "beside the others; BIC: its fall by the effect, or by another one in its place; p: "
@@ -43,7 +43,7 @@ class Row:
     alone: float | None  # Share of the squared gap that its score at the baseline promises
     last: float | None = None  # Share that it closes beside the others
     bic: float | None = None  # Fall of the BIC, beside the others
-    size: str = ""  # Value with 95 % interval; of an effect that is not fitted the shape
+    size: str = ""  # 95 % interval; of an effect that is not fitted the shape
     mark: str = ""  # Probability, or how it stands to an effect of the best model
 
     @property
@@ -126,11 +126,9 @@ class Standings:
         half = Z95 * math.sqrt(self.nearest.widening) * (estimate.stderr or math.nan)
         ends = value - half, value + half
         if named is not None:
-            value = named.parameters[candidate.size]
             ends = named.ci95.get(candidate.size, (math.nan, math.nan))
             mark = f"{named.probability:.2f}{'*' if named.approximate else ''}"
-        error = (ends[1] - ends[0]) / 2
-        size = f"{written(value, error)} {interval(Estimate(value, None, ends))}"
         bic = self._bic(candidate, one.gain)
-        size = f"{size} {self._unit(candidate, candidate.size)}".rstrip()
+        unit = self._unit(candidate, candidate.size)
+        size = f"{interval(Estimate(value, None, ends))} {unit}".rstrip()
         return Row(candidate, self._alone(candidate), one.closed, bic, size, mark)

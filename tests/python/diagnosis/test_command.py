@@ -88,7 +88,7 @@ def test_the_verdict_comes_first() -> None:
         r"^Model: w0 = \S+ rad/s, c/m = \S+ 1/s, Tr = \S+ rad/s\^2$", text, re.MULTILINE
     )
     assert re.search(r"^  quadratic_drag: q = \S+ 1/rad \[\S+, \S+\]$", text, re.MULTILINE)
-    row = r"^quadratic_drag +\d+ % +\d+ % +\d+ +0\.\d+ \[0\.\d+, 0\.\d+\] 1/rad +0\.\d\d$"
+    row = r"^quadratic_drag +\d+ % +\d+ % +\d+ +\[0\.\d+, 0\.\d+\] 1/rad +0\.\d\d$"
     assert re.search(row, text, re.MULTILINE)
     assert re.search(r"^Share of the squared gap closed: \d+ %$", text, re.MULTILINE)
     shapes = [line for line in text.splitlines() if " w = " in line]
