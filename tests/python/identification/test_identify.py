@@ -319,7 +319,7 @@ def test_time_stamps_change_nothing() -> None:
 
 RUN = run_of(TIME, np.cos(6 * TIME))
 REFUSED = {
-    "records must be paths, DataFrames .*, got 3": lambda: identify(3),  # type: ignore[arg-type]
+    "records must be paths, arrays .*, got 3": lambda: identify(3),  # type: ignore[arg-type]
     r"records must be paths, .*, got \[\]": lambda: identify([]),
     r"must be of one shape \(N,\), got": lambda: identify(TIME, TIME[1:]),
     "methods must be a list of names, .*, got 't": lambda: identify(RUN, methods="trajectory"),
