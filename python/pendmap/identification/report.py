@@ -241,8 +241,8 @@ def left_out(experiment: Experiment, read: Sequence[Run]) -> str:
             return "of peaks alone"
         return "held out" if run.hold_out else "shorter" if run.moves else "at rest"
 
-    times = {id(run.time) for run in read}  # also of a run that is used in part
-    reasons = Counter(reason(run) for run in experiment.runs if id(run.time) not in times)
+    angles = {id(run.theta) for run in read}  # also of a run that is used in part
+    reasons = Counter(reason(run) for run in experiment.runs if id(run.theta) not in angles)
     texts = [f"{count} {why}" for why, count in reasons.items()]
     return f"{counted(len(read), 'run')} read; not used: {', '.join(texts)}" if texts else ""
 
