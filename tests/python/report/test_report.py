@@ -148,7 +148,7 @@ def test_the_numbers_of_a_report_are_those_of_the_json() -> None:
         assert by_name[forecast["runs"], ahead][2:4] == last
     (effect,) = fields["effects"]
     (row,) = (r for r in rows if r[0] == f"`{effect['name']}`" and len(r) == 6)
-    ends = row[4].removesuffix("] 1/rad").partition(" [")[2].split(", ")
+    ends = row[4].removeprefix("[").removesuffix("] 1/rad").split(", ")
     assert [float(end) for end in ends] == pytest.approx(effect["ci95"]["q"], rel=0.01)
     assert row[2] == f"{100 * effect['closes']:.0f} %"
     assert row[5] == f"{effect['probability']:.2f}"
