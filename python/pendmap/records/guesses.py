@@ -217,7 +217,7 @@ def side_by_side(table: Table) -> list[Table]:
     good = [np.isfinite(table.values[:, block[:2]]).all(axis=1) for block in blocks]
     angles = [(table.values[:, block[1]], rows) for block, rows in zip(blocks, good, strict=True)]
     together = [(angles[0][0], angle, good[0] & rows) for angle, rows in angles[1:]]
-    # The same readings in another unit are no further run.
+    # A block that repeats the first one in another unit is a copy, not a run.
     if all(abs(np.corrcoef(a[rows], b[rows])[0, 1]) > COPIED for a, b, rows in together):
         return [table]
     taken, names = ("rows", "order"), table.names
