@@ -106,9 +106,9 @@ def _nameless_angle(table: Table, places: Mapping[str, int]) -> dict[str, int]:
     """Return the column that may be the angle where no heading says so: one alone, or a decay."""
     # Beside a column "X" of times "Y" is no place.
     clock = Heading.of(table.names[places["time"]]).meaning if "time" in places else ""
-    free = [k for k in range(len(table.names)) if k not in places.values()]
+    taken = {*places.values(), *axes_of(table)}
+    free = [k for k in range(len(table.names)) if k not in taken]
     free = [k for k in free if _nameless(Heading.of(table.names[k]), "xy" if clock == "x" else "")]
-    free = [k for k in free if k not in axes_of(table)]
     best = _swinging(table, free)
     alone = len(best) == 1 or (best and decays(table.values[:, best[0]]))
     return {"angle": best[0]} if alone else {}
