@@ -135,6 +135,8 @@ def test_an_invalid_value_is_refused_in_one_line(
     [
         (text((OTHER, THETA), "a,b"), {}),
         (text((0 * TIME, THETA), ""), {}),
+        (text((np.arange(TIME.size), THETA), "tick,theta_rad"), {}),  # a counter is no clock
+        (text((TIME, 0.1 * RATE, 0.2 * RATE, RATE), "t_s,z,y,x"), {}),  # axes are no places
         (text((TIME, 1e6 * THETA), "t_s,theta_rad"), {}),
         (text((0 * TIME, THETA), "t_s,theta_rad"), {}),
         (text((OTHER, THETA), "t_s,theta_rad"), {}),
@@ -159,6 +161,7 @@ def test_a_refused_file_is_read_by_the_line_that_refuses_it(
     ("columns", "names"),
     [
         ((OTHER, TIME, THETA), "a,b,c"),
+        ((np.where(TIME < 0.1, TIME, np.nan), TIME, THETA), ""),  # settings beside the rows
         ((TIME, OTHER, THETA), "t_s,a,b"),
         ((0 * TIME, TIME, np.degrees(THETA)), "angle,t_s,theta_deg"),
     ],
