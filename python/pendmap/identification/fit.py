@@ -71,13 +71,12 @@ class TrajectoryFit:
         return next((name for name in names if self[name] < 0), None)
 
     def sensors_of(self, places: Sequence[int]) -> dict[str, float]:
-        """Return bias and tilt of some runs' sensors, named as in a fit to these runs alone."""
+        """Return the bias of some runs' sensors, named as in a fit to these runs alone."""
         values = {}
         for k, place in enumerate(places):
-            for name in SENSOR:
-                known = self.estimates.get(f"{name}[{place}]") or self.estimates.get(name)
-                if known is not None:
-                    values[f"{name}[{k}]" if len(places) > 1 else name] = known.value
+            known = self.estimates.get(f"{SENSOR}[{place}]") or self.estimates.get(SENSOR)
+            if known is not None:
+                values[f"{SENSOR}[{k}]" if len(places) > 1 else SENSOR] = known.value
         return values
 
     def drive_of(self, run: FitRun, place: int) -> Mapping[str, float | None] | None:
@@ -115,7 +114,7 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
     ``model`` gives fixed parameters and starting values; ``start`` replaces starting values, where
     damping may be negative. ``free`` has names of :class:`pendmap.Rig` and ``effect.parameter``;
     those of the drive are fitted run by run, as are unknown phases. ``hold`` fixes the parameters
-    at their starting values, also bias and tilt of sensors in ``start``: only initial states and
+    at their starting values, also a bias of sensors in ``start``: only initial states and
     what is unknown of single runs are fitted. ``sigma_doubt`` is
     the relative standard error of ``sigma``, ``steps`` the maximum number of iterations in a stage;
     the search ends when the expected gain of a step is below ``least_gain``, or, with ``windows``,
@@ -128,7 +127,7 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
     wanted = names if profiled is None else profiled
     chosen = [k for k, n in enumerate(names) if {n, n.partition("[")[0]} & {*wanted}]
     begun = {name.partition("[")[0] for name in start or ()}
-    held = {*free, *begun.intersection(SENSOR)} if hold else set()
+    held = {*free, *begun.intersection([SENSOR])} if hold else set()
     choices = {
         "tolerance": tolerance_of(runs),
         "shortest": units.w0 * (math.tau / model.w0),

@@ -135,30 +135,24 @@ def as_fit_run(run: Run, reading: Reading) -> FitRun:
 
 
 def as_angles(run: Run) -> Floats:
-    """Return a run's angles; for a sensor on the rod, readings over the gain of small swings."""
-    return run.read / (1.0 if run.rod_sensor is None else run.rod_sensor.gain)
+    """Return a run's angles; for a gyroscope, readings over the gain of small swings."""
+    return run.read / (1.0 if run.gyroscope is None else run.gyroscope.w0)
 
 
 def reading_of_run(run: Run, sigma: float | None = None) -> Reading:
     """Return the standard errors of a run's readings; see :func:`reading_of`."""
-    time, sensor = from_first(run.time)[0], run.rod_sensor
-    if sensor is None:
+    time = from_first(run.time)[0]
+    if run.gyroscope is None:
         return reading_of(time, run.theta, sigma, trusted=run.trusted, count=run.count_rad)
     reading = reading_of(time, as_angles(run), sigma, trusted=run.trusted)
     law = reading.law
-    if law is not None and run.gyroscope is not None:
+    if law is not None:
         # The error of a rate by jitter is proportional to the acceleration.
         law = dataclasses.replace(law, grows_with="acceleration")
-    return dataclasses.replace(reading, law=law, gain=abs(sensor.gain), unit=sensor.unit)
+    return dataclasses.replace(reading, law=law, gain=run.gyroscope.w0, unit="rad/s")
 
 
 def _rod_sensor(run: Run) -> RodSensor | None:
-    if run.gyroscope is not None:
-        gain = run.gyroscope.gain
-        return RodSensor(run.theta, rate=1 / gain, unit=gain, leans=False)
-    sensor = run.accelerometer
-    if sensor is None:
+    if run.gyroscope is None:
         return None
-    place, gravity = sensor.distance_m / sensor.gain, sensor.gravity / sensor.gain
-    leans = sensor.direction != "angular"
-    return RodSensor(run.theta, place=place, gravity=gravity, unit=sensor.gain, leans=leans)
+    return RodSensor(run.theta, rate=1 / run.gyroscope.w0, unit=run.gyroscope.w0)

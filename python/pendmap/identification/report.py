@@ -104,7 +104,7 @@ class IdentificationReport(FitResult):
         """All readings of the fitted runs, one below the other.
 
         ``time_s`` on the clock of the run, ``reading_rad``, ``fit_rad``, ``residual_rad`` and
-        ``run``; of a sensor on the rod ``reading_rad_per_s`` or so. Fit and residual are nan where
+        ``run``; of a gyroscope ``reading_rad_per_s`` and so on. Fit and residual are nan where
         a reading is not fitted. InputError is raised without a fit of whole records.
         """
         import pandas as pd  # noqa: PLC0415 (where it is needed)
@@ -112,8 +112,7 @@ class IdentificationReport(FitResult):
         fit, _, runs = self.followed()
         parts = []
         for run, left in zip(runs, fit.residuals, strict=True):
-            sensor = run.rod_sensor
-            gain, unit = (1.0, "rad") if sensor is None else (sensor.gain, sensor.unit)
+            gain, unit = (1.0, "rad") if run.gyroscope is None else (run.gyroscope.w0, "rad/s")
             residual = np.where(run.trusted, gain * left, np.nan)
             columns = {"reading": run.read, "fit": run.read - residual, "residual": residual}
             named = {
@@ -211,8 +210,8 @@ class IdentificationReport(FitResult):
         best, notes = self.best, dict[str, Any]()
         if best.covariance is not None:
             names, matrix = best.covariance
-            # Bias and tilt of a sensor do not belong to the pendulum.
-            written = {name: name for name in names if name.partition("[")[0] not in SENSOR}
+            # The bias of a sensor does not belong to the pendulum.
+            written = {name: name for name in names if name.partition("[")[0] != SENSOR}
             if "offset" in written:
                 written["offset"] = f"{OFFSET}.d"
             places = [names.index(name) for name in written]

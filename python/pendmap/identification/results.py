@@ -123,7 +123,7 @@ class Parameters(Saved):
         """Return the unit of a parameter; empty for a pure number."""
         parameter, _, run = name.partition("[")
         if parameter == "bias" and self.sensors:
-            return self.sensors[int(run[:-1] or 0)].replace("s2", "s²")
+            return self.sensors[int(run[:-1] or 0)]
         return unit_of(name, self.definition)
 
     def to_dataframe(self) -> pd.DataFrame:
@@ -193,8 +193,7 @@ class FitResult(Parameters):
     @property
     def sensors(self) -> Sequence[str]:
         """Units of the readings of each fitted run."""
-        sensors = (run.rod_sensor for run in self.followed().runs)
-        return ["rad" if sensor is None else sensor.unit for sensor in sensors]
+        return ["rad/s" if run.gyroscope else "rad" for run in self.followed().runs]
 
     def further(self) -> dict[str, Any]:
         """Return the covariance, and time and run of each reading that is fitted."""

@@ -19,18 +19,11 @@ if TYPE_CHECKING:
     from pendmap.identification.methods.base import Identification
     from pendmap.identification.peaks import Peaks
     from pendmap.model import Rig
-    from pendmap.records import Run
     from pendmap.signal import Floats
 
 PERIODS: Final = (0.26, 1.54)
 """Periods of the paper's table, s; on a slower rig the first is that of small swings."""
 PEAKS: Final = (1.2, 2.53)  # Peaks of the paper's table, rad
-
-ROUGH: Final = (
-    "no errors of periods and peaks: the angle is computed from an acceleration, too inaccurate "
-    "to judge a model: use the residual of the acceleration"
-)
-"""Reason why a record of an acceleration alone has no table."""
 
 _SAME: Final = 1e-9  # Interval below which events are identical, s
 
@@ -202,13 +195,6 @@ def table1(
         if row := _row(what, asked, errors):
             rows.setdefault((what, row.measured), row)
     return Table1(tuple(rows.values()), errors, lost=lost)
-
-
-def table_of_run(run: Run, peaks: Peaks, identifications: Mapping[str, Identification]) -> Table1:
-    """Return table 1 of a run; empty if its angle was computed from an acceleration."""
-    if run.accelerometer is not None:
-        return Table1((), {}, ROUGH)
-    return table1(peaks, identifications)
 
 
 def _row(what: str, asked: float, errors: Mapping[str, PeakErrors]) -> Row | None:

@@ -1,8 +1,7 @@
-"""Rules of the angle: read, integrated, or computed from pixels or an acceleration."""
+"""Rules of the angle: read, integrated, or computed from pixels."""
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from typing import TYPE_CHECKING, Final
 
@@ -12,13 +11,10 @@ from numpy.polynomial.legendre import legvander
 from pendmap.errors import InputError
 from pendmap.formatting import counted
 from pendmap.records.by_hand import by_hand
-from pendmap.records.noise import noise_of
-from pendmap.records.rod_sensors import FEWEST_PEAKS, PLACE_EXAMPLE, angle_of_rate
-from pendmap.signal.half_cycles import swings
+from pendmap.records.rod_sensors import angle_of_rate
 from pendmap.signal.robust import normal_scale
 
 if TYPE_CHECKING:
-    from pendmap.records.rod_sensors import Accelerometer
     from pendmap.records.work import Work
     from pendmap.signal import Floats, Mask
     from pendmap.tables.findings import Finding
@@ -27,10 +23,6 @@ WRAPPED_SPAN: Final = 1.01  # Greatest span of wrapped readings, turns: one turn
 WRAP_JUMP: Final = 0.75  # Least jump between neighbours that is a wrap, turns
 LARGEST_ANGLE: Final = 1e5  # Greatest plausible angle, rad: about 16,000 turns
 MOST_HUGE: Final = 0.5  # Share of implausible angles above which the column is refused
-LEAST_SWING: Final = 5.0  # Least reading of a swing, standard deviations of the noise
-LARGEST_READING: Final = 1.15  # Greatest reading, over the theoretical maximum: else wrong unit
-ONE_SIDED: Final = 0.15  # Smaller over larger side of the readings below which the axis is radial
-BLIND_SPOT: Final = 0.05  # Relative distance to the centre of oscillation that is refused
 DRIFT_DEGREE: Final = 8  # Degree of the polynomials of time along which a camera drifts
 OFF_CIRCLE: Final = 0.3  # Greatest distance of places from a circle, over their spread, rms
 BLOCKS: Final = 30  # Blocks of a record that give the error of a radius
@@ -56,10 +48,7 @@ def source_missing(work: Work) -> Finding | None:
         return None
     if "pixel_x" in work.extra:
         return _finite(work, "position", work.extra["pixel_x"], work.extra["pixel_y"])
-    if "velocity" in work.extra:
-        return _finite(work, "velocity", work.extra["velocity"])
-    _placed(work)
-    return _finite(work, "acceleration", work.extra["acceleration"])
+    return _finite(work, "velocity", work.extra["velocity"])
 
 
 def _finite(work: Work, what: str, *values: Floats) -> Finding | None:
@@ -76,107 +65,17 @@ def _finite(work: Work, what: str, *values: Floats) -> Finding | None:
 
 
 def derived(work: Work) -> Finding | None:
-    """Compute the angle from pixels, a velocity or an acceleration, in this order."""
-    given = "angle" in work.columns or work.peaks_only
-    if "acceleration" in work.extra and (given or {"pixel_x", "velocity"} & work.extra.keys()):
+    """Compute the angle from pixels or else a velocity."""
+    if "acceleration" in work.extra:
         work.note("acceleration-unused")
-    if given:
+    if "angle" in work.columns or work.peaks_only:
         return None
     if "pixel_x" in work.extra:
         return _circle_angle(work, work.extra.pop("pixel_x"), work.extra.pop("pixel_y"))
-    if "velocity" in work.extra:
-        rate = work.extra["velocity"]
-        work.theta = angle_of_rate(work.time, rate, np.abs(rate) < LARGEST_ANGLE)
-        work.integrated = True
-        return work.finding("angle-integrated")
-    reading, sensor = work.extra["acceleration"], _placed(work)
-    work.theta, work.accelerometer = _sine_of_angle(work.time, reading, sensor, work.where)
-    place = "an angular acceleration"
-    if sensor.direction != "angular":
-        removed = f"g = {sensor.gravity:g} m/s^2" if sensor.gravity else "gravity removed"
-        place = f"a tangential acceleration {sensor.distance_m:g} m from the pivot, {removed}"
-    return work.finding("angle-from-acceleration", place=place)
-
-
-def _placed(work: Work) -> Accelerometer:
-    """Return the accelerometer of a record; InputError if no angle follows from it alone."""
-    sensor = work.accelerometer
-    if sensor is None:
-        why = (
-            "an acceleration alone gives an angle only if the place of the sensor is known:"
-            f" {work.place_missing} missing in [columns] of experiment.toml: it must be like"
-            f" {PLACE_EXAMPLE}"
-        )
-    elif sensor.direction == "radial":
-        why = (
-            "a radial acceleration alone cannot tell left from right: it must be the tangential one"
-        )
-    elif not work.free:
-        why = "an acceleration alone on a forced run includes the pivot's: it must be a free decay"
-    else:
-        return sensor
-    raise InputError(
-        f"{work.where}: {why}, or the record must also have an angle, a velocity (gyroscope)"
-        f" or pixel_x and pixel_y{work.other('angle')}"
-    )
-
-
-def _sine_of_angle(
-    time: Floats, reading: Floats, sensor: Accelerometer, where: str
-) -> tuple[Floats, Accelerometer]:
-    """Return the sine of the angle of free swings by an acceleration alone, and its sensor.
-
-    Raises InputError if the readings are not those of free swings.
-    """
-    from scipy.special import ellipk
-
-    least = max(LEAST_SWING * np.nan_to_num(noise_of(time, reading).sigma), 1e-12)
-    middle = float(np.median(reading))
-    for _ in range(3):
-        half = swings(time, reading - middle, least=least)
-        if half.peak.size < FEWEST_PEAKS:
-            raise InputError(
-                f"{where}: the acceleration must show {FEWEST_PEAKS} half swings or more if there"
-                f" is no angle, got {half.peak.size}"
-            )
-        middle += float(np.median(half.middle))
-    values, size = reading - middle, np.abs(half.peak[1:-1])
-    blind = size.max() < 2 * least and sensor.gravity
-    low, high = np.quantile(reading, (0.02, 0.98)).tolist()
-    sided = low * high > 0 or min(abs(low), abs(high)) < ONE_SIDED * max(abs(low), abs(high))
-    if sided and sensor.direction != "angular":
-        raise InputError(
-            f'{where}: direction is "tangential", but the readings lie on one side, {low:.3g} to'
-            f" {high:.3g} m/s^2, as those along the rod: it must be the column of the axis across"
-            " the rod"
-        )
-    smaller = np.argsort(size)[: max(size.size // 3, 3)]
-    w0 = 2 * math.pi / float(np.median(half.period[smaller]))
-    for _ in range(20):
-        share = np.minimum(size / max(abs(dataclasses.replace(sensor, w0=w0).gain), 1e-9), 1.0)
-        grown = 2 / math.pi * ellipk(np.sin(np.arcsin(share) / 2) ** 2)
-        w0 = (w0 + 2 * math.pi * float(np.median((grown / half.period)[smaller]))) / 2
-    sensor = dataclasses.replace(sensor, w0=w0)
-    if blind or abs(sensor.distance_m * w0**2 / (sensor.gravity or math.inf) - 1) < BLIND_SPOT:
-        raise InputError(
-            f"{where}: distance_m is {sensor.distance_m:g}, and the readings are hardly more than"
-            " noise, as at the centre of oscillation, g/w0^2 from the pivot, where gravity and the"
-            " swing cancel: only damping is measured there; it must be another place on the rod, or"
-            " an angle must be recorded too"
-        )
-    most, top = abs(sensor.gain), float(np.quantile(size, 0.8))
-    if top > LARGEST_READING * most:
-        raise InputError(
-            f"{where}: the acceleration reaches {top:.3g} {sensor.unit}, and a swing of this period"
-            f" at most {most:.3g}: unit, distance_m, direction or gravity_removed is wrong"
-        )
-    return values / sensor.gain, sensor
-
-
-def of_sine(work: Work) -> None:
-    """Compute the angle of an accelerometer, right below a quarter turn, from its sine."""
-    if work.angle_source is not None:
-        work.theta = np.arcsin(np.clip(work.theta, -1, 1))
+    rate = work.extra["velocity"]
+    work.theta = angle_of_rate(work.time, rate, np.abs(rate) < LARGEST_ANGLE)
+    work.integrated = True
+    return work.finding("angle-integrated")
 
 
 def _circle_angle(work: Work, x: Floats, y: Floats) -> Finding:

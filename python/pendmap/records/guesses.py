@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from pendmap.tables.text import Table
 
 # Channels from which an angle can be computed
-ANGLE_CHANNELS: Final = ("angle", "velocity", "pixel_x", "pixel_y", "acceleration", "peaks")
+ANGLE_CHANNELS: Final = ("angle", "velocity", "pixel_x", "pixel_y", "peaks")
 POSITION_AGREES: Final = 0.9  # Least correlation of a position with the integrated velocity
 RISING: Final = 0.9  # Least share of rising steps of a clock
 DECAYED: Final = 0.9  # Greatest spread of a decayed last quarter, over that of the first

@@ -9,7 +9,6 @@ import numpy as np
 
 from pendmap.errors import InputError
 from pendmap.formatting import counted, listed, moment
-from pendmap.records.by_hand import by_hand
 from pendmap.records.driven import half_cycles
 from pendmap.records.experiment import Segment
 from pendmap.records.releases import releases
@@ -24,7 +23,6 @@ if TYPE_CHECKING:
     from pendmap.tables.findings import Finding
 
 STILL_SPAN: Final = 8.0  # Range of readings below which there is no motion, over the noise
-FOLDED: Final = 0.97  # Reading over the gain, of an accelerometer, near a quarter turn
 NOISE_SPAN: Final = 0.1  # Range, rad, below which readings dominated by noise show no motion
 FAR_HOLD: Final = 0.05  # Distance of a hold from the middle of the swings, over their range
 FEWEST_HALF_CYCLES: Final = 5  # Fewest half cycles of a release that is a run, about three swings
@@ -70,20 +68,16 @@ def free_motions(work: Work) -> Finding | None:
     if not work.free:
         return None
     _measure_noise(work)
-    good, w0, middle = work.trusted, work.known.get("w0"), 0.0
-    if work.angle_source is not None:
-        w0 = work.angle_source.w0
-    else:
-        middle = _middle(work)
-        periods = periods_of(work.time[good], work.theta[good] - middle, work.count)
-        w0 = w0 if periods is None else 2 * math.pi / periods.small
+    good, w0, middle = work.trusted, work.known.get("w0"), _middle(work)
+    periods = periods_of(work.time[good], work.theta[good] - middle, work.count)
+    w0 = w0 if periods is None else 2 * math.pi / periods.small
     if not w0:
         return work.finding("no-swing")
     work.middle, work.period = middle, 2 * math.pi / w0
     span = _trusted_span(work)
     parts = [(a, b) for a, b in between(_still(work, span), *span) if b - a > 5]
     work.parts = releases(work, parts)
-    return None if work.angle_source is None else _below_a_quarter_turn(work)
+    return None
 
 
 def _middle(work: Work) -> float:
@@ -97,21 +91,6 @@ def _middle(work: Work) -> float:
     if before is None or abs(before - middle) <= FAR_HOLD * float(np.ptp(theta)):
         return middle
     return before
-
-
-def _below_a_quarter_turn(work: Work) -> Finding | None:
-    """Begin each motion where an acceleration shows swings below a quarter turn."""
-    parts, late = [], []
-    for low, high in work.parts:
-        good, sine, half = half_cycles(work, (low, high))
-        folded = work.time[good][np.abs(sine) > FOLDED]
-        after = half.crossing[half.crossing > folded[-1]] if folded.size else folded
-        begin = int(np.searchsorted(work.time, after[0])) if after.size else low
-        late += [moment(work.time[begin])] if begin > low else []
-        parts += [(begin, high)] if high - begin > 5 else []
-    work.parts = parts
-    times = listed(late, MOST_LISTED)
-    return work.finding("acceleration-folded", times=times) if late else None
 
 
 def _trusted_span(work: Work) -> Stretch:
@@ -146,13 +125,6 @@ def used_motions(work: Work) -> Finding | None:
     work.releases = [part for part, use in zip(work.parts, used, strict=True) if use]
     spans = [f"{moment(work.time[a])} to {moment(work.time[b - 1])} s" for a, b in work.parts]
     taken = [text for text, use in zip(spans, used, strict=True) if use]
-    if work.angle_source is not None and len(taken) > 1:
-        low, high = work.releases[0]
-        span_of = {"from_s": float(work.time[low]), "to_s": float(work.time[high - 1])}
-        raise InputError(
-            f"{work.where}: an acceleration without an angle must be of one release, got"
-            f" {len(taken)}, of {listed(taken, MOST_LISTED)}: {by_hand(work.where, **span_of)}"
-        )
     _settle(work, used, span)
     if len(used) < 2:
         return None

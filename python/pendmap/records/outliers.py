@@ -323,12 +323,10 @@ def _whole(jump: Jump, count: float) -> int:
 
 
 def spikes(work: Work) -> Finding | None:
-    """Mark readings of a sensor on the rod far from all their neighbours; steps are none."""
+    """Mark readings of a rate far from all their neighbours; steps are none."""
     from scipy.ndimage import median_filter
 
-    sensor = work.angle_source
-    # The acceleration is checked, since the angle computed from it has corners.
-    values = work.extra["velocity"] if sensor is None else work.extra["acceleration"]
+    values = work.extra["velocity"]
     fit = local_fit(work.time, values)
     size = np.abs(fit.residual)
     if size.size < POINTS:
@@ -338,8 +336,8 @@ def spikes(work: Work) -> Finding | None:
     at = fit.middle[(size > limit) & (np.abs(away[fit.middle]) > limit)]
     if at.size > MOST_OUTLIERS * values.size:
         return None
-    worst, unit = np.max(np.abs(away[at]), initial=0.0), "rad/s" if sensor is None else sensor.unit
-    return work.distrust(at, "outliers", "outlier", worst=worst, unit=unit)
+    worst = np.max(np.abs(away[at]), initial=0.0)
+    return work.distrust(at, "outliers", "outlier", worst=worst, unit="rad/s")
 
 
 def integrate_again(work: Work) -> None:

@@ -303,7 +303,6 @@ def _run(work: Work, name: str, digest: str) -> Run:
         hold_out=plan.hold_out,
         velocity=work.extra.get("velocity"),
         acceleration=work.extra.get("acceleration"),
-        accelerometer=work.angle_source,
         gyroscope=gyroscope,
         drive=dataclasses.asdict(plan.drive) if plan.drive else None,
         pivot=work.pivot or None,

@@ -24,8 +24,8 @@ NYQUIST: Final = 2.0  # Fewest readings per period of the drive that resolve it
 LEFT_OUT: Final = 0.1  # Share of readings in motion that a fit may leave out without a warning
 MOVING: Final = ("motion", "driven", "handled")  # Segments that may belong to a decay
 # Findings that leave readings in motion out
-REASONS: Final = ["acceleration-folded", "braked-end", "clipped", "driven-start", "frozen"]
-LEAVES_OUT: Final = [*REASONS, "missed-counts", "outliers", "several-releases", "trigger-release"]
+REASONS: Final = ["braked-end", "clipped", "driven-start", "frozen", "missed-counts", "outliers"]
+LEAVES_OUT: Final = [*REASONS, "several-releases", "trigger-release"]
 ON_STEPS: Final = 0.12  # Greatest rms distance from multiples of a step, in steps; chance: 0.29
 EDGE_SHARE: Final = 0.95  # Share of single-count steps above which a record is a log of edges
 FEWEST_EDGES: Final = 50  # Fewest readings from which edges are recognized
@@ -58,7 +58,7 @@ def drive(work: Work) -> Finding | None:
 
 def gain(work: Work) -> Finding | None:
     """Report swings too small to determine the gain of the sensor."""
-    free = work.free and work.angle_source is None and not work.integrated
+    free = work.free and not work.integrated
     good = work.trusted
     interval = gain_of(work.time[good], work.theta[good], work.count) if free else None
     if interval is None or interval[1] - interval[0] <= 2 * GAIN_KNOWN:

@@ -1,9 +1,6 @@
-"""Accelerometers and gyroscopes on the rod, and the angle that their readings give.
+"""The angle that the readings of a gyroscope on the rod give.
 
-At the distance r from the pivot an accelerometer reads ``r th'' + g sin(th)`` across the rod, and
-``r th'^2 + g cos(th)`` along it; without g if the phone removes gravity. Across the rod a free
-swing without damping gives ``(g - r w0**2) sin(th)``, unambiguous below a quarter turn. A gyroscope
-reads th' plus a bias. Both angles serve as initial guess of a fit and for figures.
+A gyroscope reads th' plus a bias; the angle serves as initial guess of a fit and for figures.
 """
 
 from __future__ import annotations
@@ -15,69 +12,19 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.signal.half_cycles import swings
-from pendmap.tables.units import ANGULAR_ACCELERATIONS, name_and_unit, plain, spelling
 
 if TYPE_CHECKING:
-    from pendmap.records.description import Column, Direction
     from pendmap.signal import Floats, Mask
 
-# Example of a sensor's position in [columns]
-PLACE_EXAMPLE: Final = 'acceleration = { direction = "tangential", distance_m = 0.25 }'
 OVER_THE_TOP: Final = 4 * math.pi  # Range of angles above which a record contains rotations, rad
 FEWEST_PEAKS: Final = 4  # Fewest turning points from which a drift or a period is estimated
-
-
-@dataclasses.dataclass(frozen=True)
-class Accelerometer:
-    """Accelerometer on the rod at a known position."""
-
-    direction: Direction  # toward positive theta, toward the pivot, or about it
-    distance_m: float  # from the pivot; 1 for an angular acceleration
-    gravity: float  # m/s^2; 0 if removed from the readings
-    w0: float = math.nan  # rad/s, from crossings; NaN if no angle was computed
-
-    @property
-    def gain(self) -> float:
-        """Reading of a small free swing over its angle, ``g - r w0**2``; m/s^2 or rad/s^2."""
-        return self.gravity - self.distance_m * self.w0**2
-
-    @property
-    def unit(self) -> str:
-        """Unit of the readings."""
-        return "rad/s2" if self.direction == "angular" else "m/s2"
-
-
-def accelerometer_of(column: Column, head: str, gravity: float) -> tuple[Accelerometer | None, str]:
-    """Return the accelerometer of a column, or None and the missing keys of its position."""
-    heading, unit = name_and_unit(head)
-    angular = column.scale is None and spelling(column.unit or unit or "") in ANGULAR_ACCELERATIONS
-    direction = column.direction or ("angular" if angular else None)
-    if direction == "angular":
-        return Accelerometer("angular", 1.0, 0.0), ""
-    if direction is None or column.distance_m is None:
-        keys = {"direction": direction, "distance_m": column.distance_m}
-        return None, " and ".join(key for key, value in keys.items() if value is None)
-    removed = column.gravity_removed
-    if removed is None:
-        removed = plain(heading).startswith("linear")
-    return Accelerometer(direction, column.distance_m, 0.0 if removed else gravity), ""
 
 
 @dataclasses.dataclass(frozen=True)
 class Gyroscope:
     """Gyroscope from whose readings alone the angle was computed."""
 
-    w0: float  # rad/s, from speeds in the middle of swings
-
-    @property
-    def gain(self) -> float:
-        """Reading of a small free swing over its angle, ``w0``; rad/s."""
-        return self.w0
-
-    @property
-    def unit(self) -> str:
-        """Unit of the readings."""
-        return "rad/s"
+    w0: float  # rad/s, from speeds in the middle of swings: its reading over a small angle
 
 
 def angle_of_rate(time: Floats, rate: Floats, good: Mask | None = None) -> Floats:

@@ -29,7 +29,7 @@ _TEXTS: Final = (".csv", ".tsv", ".txt", ".dat")
 _BINARY: Final = (".parquet", ".pq", ".xlsx", ".ods", ".mat", ".trk", ".trz", ".zip")
 # Suffixes of the files that are records in a folder without a description
 TABLES: Final = (*_TEXTS, *_BINARY)
-_ANGLES: Final = ("angle", "velocity", "pixel_x", "acceleration")  # Wanted, best first
+_ANGLES: Final = ("angle", "velocity", "pixel_x")  # Wanted, best first
 _ZIP: Final = b"PK\x03\x04"
 _MOST_MEMBERS: Final = 200  # Most members of an archive
 _MISSING: Final = (

@@ -33,12 +33,10 @@ LENGTHS: Final[dict[str, float]] = _TABLES["length"]
 RAW: Final = frozenset(_TABLES["raw"])
 DEGREE: Final = ANGLES["deg"]
 SPEEDS: Final = {f"{a}/{t}": ANGLES[a] / TIMES[t] for t in ("s", "min") for a in ANGLES}
-# Units of an angular acceleration, in rad/s^2
-ANGULAR_ACCELERATIONS: Final = {f"{name}/s2": factor for name, factor in ANGLES.items()}
 _ACCELERATIONS: Final = {
     **{f"{name}/s2": factor for name, factor in LENGTHS.items() if name != "px"},
     "g": 9.80665,
-    **ANGULAR_ACCELERATIONS,
+    **{f"{name}/s2": factor for name, factor in ANGLES.items()},
 }
 
 _UNITS: Final[dict[str, str]] = {

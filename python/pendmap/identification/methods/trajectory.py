@@ -101,8 +101,8 @@ def _warnings(joint: JointFit, estimates: Mapping[str, Estimate]) -> list[str]:
         )
     if not fit.converged:
         warnings.append("the search did not converge")
-    # A sensor's tilt is determined by large swings only: its interval is not reported.
-    wanted = {name: e for name, e in estimates.items() if name.partition("[")[0] not in SENSOR}
+    # The interval of a sensor's bias is not reported.
+    wanted = {name: e for name, e in estimates.items() if name.partition("[")[0] != SENSOR}
     lost = [name for name, e in wanted.items() if e.ci95 is None and name not in joint.negative]
     if lost:
         warnings.append(f"no finite interval was found for {', '.join(lost)}")
@@ -240,7 +240,7 @@ def _from_upright(run: Run) -> Run:
     after = np.arange(run.time.size) > np.max(np.flatnonzero(near), initial=-1)
     left = np.count_nonzero(run.trusted & after)
     if (
-        run.rod_sensor is not None
+        run.gyroscope is not None
         or not np.count_nonzero(run.trusted) > left > MOST_LEFT * after.size
     ):
         return run
