@@ -1,9 +1,10 @@
-"""What results of records have in common: parameters, residual, motion of the model."""
+"""What results of records have in common: parameters, residual, motion of the model; files."""
 
 from __future__ import annotations
 
 import abc
 import dataclasses
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple
 
 import numpy as np
@@ -11,10 +12,11 @@ import pandas as pd
 import xarray as xr
 
 from pendmap.errors import InputError, short_repr
+from pendmap.files.atomic import whole_file
 from pendmap.files.saved import Saved
 from pendmap.files.variables import variable
 from pendmap.formatting import estimate_text, html_table, interval, moment
-from pendmap.identification.motion import Motion, run_forward
+from pendmap.identification.fit import Motion, run_forward
 from pendmap.model.effects import definition
 from pendmap.model.labels import unit_of
 
@@ -32,6 +34,9 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats
 
     Covariance = tuple[Sequence[str], Floats]
+    import os
+
+    from pendmap.identification import IdentificationReport
 
 EXACT: Final = 1e-9  # Nominal noise that sets the integrator's tolerance of a prediction, rad
 STEP: Final = 1e-3  # Time between samples that are added, since a run has three or more, s
@@ -285,3 +290,26 @@ class FitResult(Parameters):
 def _begin(given: FitRun, run: Run) -> float:
     """Return the time on the clock of a run at time 0 of its fit, s."""
     return 0.0 if given.drive is not None else float(run.time[0])
+
+
+SUFFIXES: Final = (".csv", ".xlsx", ".mat")
+MOST_ROWS: Final = 2**20 - 1  # Rows of a sheet of Excel below its header
+
+
+def write_readings(report: IdentificationReport, path: str | os.PathLike[str]) -> Path:
+    """Write the ``readings`` of a report; ``.mat`` has a variable a column, runs as cells."""
+    table, suffix = report.readings, Path(path).suffix.lower()
+    if suffix == ".xlsx" and len(table) > MOST_ROWS:
+        text = f"must have {MOST_ROWS} readings at most, got {len(table)}: .csv and .mat take all"
+        raise InputError(f"{path}: {text}")
+    with whole_file(path, SUFFIXES) as part:
+        if suffix == ".csv":
+            table.to_csv(part, index=False)
+        elif suffix == ".xlsx":
+            table.to_excel(part, index=False, sheet_name="readings", engine="openpyxl")
+        else:
+            from scipy.io import savemat  # noqa: PLC0415 (where it is needed)
+
+            columns = {name: values.to_numpy() for name, values in table.items()}
+            savemat(part, columns, do_compression=True, oned_as="column")
+    return Path(path)

@@ -15,7 +15,7 @@ from pendmap.formatting import Estimate, counted, estimate_text, listed, moment
 from pendmap.records.by_hand import by_hand
 from pendmap.records.noise import OUTLIER, raise_degree
 from pendmap.records.resolution import FEWEST_EDGES, logs_edges, spread_stamps
-from pendmap.records.slips import slips_of
+from pendmap.records.steps import slips_of
 from pendmap.records.work import FEWEST_SAMPLES
 from pendmap.signal.local_polynomial import local_fit
 from pendmap.signal.robust import broad_scale, intervals_of

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from pendmap.records.description import Kind
-    from pendmap.records.rod_sensors import Gyroscope
     from pendmap.signal import Floats, Mask
     from pendmap.tables.findings import Finding
 
@@ -42,6 +41,13 @@ class Segment:
     from_s: float
     to_s: float
     used: bool
+
+
+@dataclasses.dataclass(frozen=True)
+class Gyroscope:
+    """Gyroscope from whose readings alone the angle was computed."""
+
+    w0: float  # rad/s, from speeds in the middle of swings: its reading over a small angle
 
 
 @dataclasses.dataclass(frozen=True, repr=False)

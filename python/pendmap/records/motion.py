@@ -9,10 +9,9 @@ import numpy as np
 
 from pendmap.errors import InputError
 from pendmap.formatting import counted, listed, moment
-from pendmap.records.driven import half_cycles
+from pendmap.records.angle import gyroscope_of
 from pendmap.records.experiment import Segment
-from pendmap.records.releases import releases
-from pendmap.records.rod_sensors import gyroscope_of
+from pendmap.records.releases import half_cycles, releases
 from pendmap.records.scale import middle_of, periods_of
 from pendmap.signal.local_polynomial import local_fit
 from pendmap.signal.robust import between, normal_scale, stretches, widened

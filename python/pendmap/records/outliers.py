@@ -14,11 +14,10 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.formatting import counted, moment
+from pendmap.records.angle import angle_of_rate
 from pendmap.records.clock import longest_between
 from pendmap.records.noise import DEGREES, fastest
-from pendmap.records.rod_sensors import angle_of_rate
-from pendmap.records.slips import MOST_INTERVALS, slips_of
-from pendmap.records.steps import sides_of
+from pendmap.records.steps import MOST_INTERVALS, sides_of, slips_of
 from pendmap.records.work import Jump
 from pendmap.signal.local_polynomial import POINTS, local_fit
 from pendmap.signal.robust import broad_scale, normal_scale, widened

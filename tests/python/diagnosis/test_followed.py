@@ -19,7 +19,7 @@ from pendmap.diagnosis.fitted_model import fit_model
 from pendmap.diagnosis.state import State
 from pendmap.diagnosis.thresholds import Thresholds
 from pendmap.records import Experiment, Run
-from pendmap.records.rod_sensors import Gyroscope
+from pendmap.records.experiment import Gyroscope
 from pendmap.residuals.torque import residual_torque
 
 TIME = np.arange(1000) * 0.02

@@ -17,7 +17,7 @@ from pendmap.comparison import compare
 from pendmap.identification import METHODS, Estimate, Identification, Peaks, find_peaks, table1
 from pendmap.identification.methods import combined, lines, repaired
 from pendmap.identification.methods.registry import identify_peaks
-from pendmap.identification.period import frequency, mean_period
+from pendmap.identification.peaks import frequency, mean_period
 from pendmap.identification.readings import reading_of
 from pendmap.records.noise import noise_of
 

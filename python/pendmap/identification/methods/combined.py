@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.identification.methods.base import Identification, identified, inapplicable, too_few
-from pendmap.identification.period import mean_period
+from pendmap.identification.peaks import mean_period
 from pendmap.identification.uncertainty import bootstrap, propagated
 
 if TYPE_CHECKING:

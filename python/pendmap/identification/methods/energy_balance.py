@@ -18,7 +18,7 @@ from pendmap.identification.methods.base import (
     inapplicable,
     too_few,
 )
-from pendmap.identification.period import frequency, viscous_work
+from pendmap.identification.peaks import frequency, viscous_work
 from pendmap.identification.uncertainty import chain_covariance, chain_least_squares
 from pendmap.signal.local_polynomial import smoothed_velocity
 

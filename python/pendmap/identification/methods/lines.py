@@ -19,7 +19,7 @@ from pendmap.identification.methods.base import (
     too_few,
 )
 from pendmap.identification.methods.combined import CUT
-from pendmap.identification.period import frequency
+from pendmap.identification.peaks import frequency
 from pendmap.identification.uncertainty import least_squares_line, propagated
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 
 from pendmap.identification.methods.base import MISFIT, Identification, identified, too_few
 from pendmap.identification.methods.combined import CUT, recursion, small_peaks
-from pendmap.identification.period import frequency
+from pendmap.identification.peaks import frequency
 from pendmap.identification.uncertainty import jacobian
 
 if TYPE_CHECKING:
