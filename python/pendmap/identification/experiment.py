@@ -222,15 +222,12 @@ def _best(
         known["w0"] = experiment.w0
     try:
         joint = fit_together(runs, start=start or known, effects=effects)
-    except TooShortError as error:
-        if effects:
-            raise
-        return None, Identification(BEST, warnings=(str(error),), applicable=False)
-    except FitDiverged as error:
-        if start is not None or effects:
-            raise
+    except (TooShortError, FitDiverged) as error:
+        short = isinstance(error, TooShortError)
         # Other methods can replace this one, but not for requested effects or starting values.
-        return None, Identification(BEST, warnings=(str(error),), applicable=False, converged=False)
+        if effects or not (short or start is None):
+            raise
+        return None, Identification(BEST, warnings=(str(error),), applicable=False, converged=short)
     certain = joint.fit.converged or len(runs) > 1
     # A wrong unit makes residuals meaningless.
     if certain and not doubt_keys(experiment, *runs) & UNIT_FINDINGS:

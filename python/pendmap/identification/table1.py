@@ -12,7 +12,7 @@ from pendmap.analysis.trajectory import simulate
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
     from numpy.typing import NDArray
 
@@ -155,11 +155,10 @@ def errors_of(method: str, peaks: Peaks, times: Floats, angles: Floats) -> PeakE
 def table1(
     record_peaks: Peaks,
     identifications: Mapping[str, Identification],
-    *,
-    periods: Sequence[float] = PERIODS,
-    peaks: Sequence[float] = PEAKS,
 ) -> Table1:
     """Compare simulations of identified models from the first peak with a record.
+
+    The rows have the measured periods and peaks nearest to those of the paper's table.
 
     Parameters
     ----------
@@ -167,8 +166,6 @@ def table1(
         Peaks of the record, as from :func:`pendmap.identification.find_peaks`.
     identifications : mapping of str to Identification
         ``methods`` of :func:`pendmap.identify`; inapplicable ones are ignored.
-    periods, peaks : sequence of float
-        Rows of the table: the measured period (s) or peak (rad) nearest to each is used.
 
     Returns
     -------
@@ -191,7 +188,7 @@ def table1(
             lost[name] = str(error)
     # One measured value may be nearest to several values of the paper.
     rows: dict[tuple[str, float], Row] = {}
-    for what, asked in [*(("period", t) for t in periods), *(("peak", a) for a in peaks)]:
+    for what, asked in [*(("period", t) for t in PERIODS), *(("peak", a) for a in PEAKS)]:
         if row := _row(what, asked, errors):
             rows.setdefault((what, row.measured), row)
     return Table1(tuple(rows.values()), errors, lost=lost)

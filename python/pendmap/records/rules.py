@@ -16,7 +16,6 @@ from pendmap.records import (
     motion,
     noise,
     outliers,
-    pivot,
     releases,
     resolution,
     samples,
@@ -86,12 +85,12 @@ RULES: Final[Rules] = (
     ("moves", releases.marked),
     ("moves", motion.used_motions),
     ("moves", motion.held_or_at_rest),
-    ("driven", pivot.pivot_unit),
+    ("driven", resolution.pivot_unit),
     # What a fit can tell
     ("moves", resolution.used_share),
     ("moves", resolution.drive),
     ("moves", resolution.gain),
-    ("sampled", pivot.pivot_steps),
+    ("sampled", resolution.pivot_steps),
 )
 # Rules of each release of a record
 OF_RELEASE: Final[Rules] = (("moves", noise.grows),)
