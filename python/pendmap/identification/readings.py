@@ -113,7 +113,7 @@ def as_fit_run(run: Run, reading: Reading) -> FitRun:
     Times are relative to the first sample, except under a drive, for its phase.
     """
     time, first = from_first(run.time) if run.drive is None else (run.time, 0.0)
-    pivot = None
+    pivot, gyro = None, run.gyroscope
     if run.pivot is not None:
         quantity = QUANTITIES[run.pivot_unit or "m/s2"]
         pivot = Pivot(
@@ -128,7 +128,7 @@ def as_fit_run(run: Run, reading: Reading) -> FitRun:
         pivot=pivot,
         lab_time_s=run.lab_time_s + first,
         name=run.name,
-        rod_sensor=_rod_sensor(run),
+        rod_sensor=None if gyro is None else RodSensor(run.theta, 1 / gyro.w0, gyro.w0),
         count=reading.count if reading.coarse else None,
         clock_stderr=run.clock_stderr,
     )
@@ -150,9 +150,3 @@ def reading_of_run(run: Run, sigma: float | None = None) -> Reading:
         # The error of a rate by jitter is proportional to the acceleration.
         law = dataclasses.replace(law, grows_with="acceleration")
     return dataclasses.replace(reading, law=law, gain=run.gyroscope.w0, unit="rad/s")
-
-
-def _rod_sensor(run: Run) -> RodSensor | None:
-    if run.gyroscope is None:
-        return None
-    return RodSensor(run.theta, rate=1 / run.gyroscope.w0, unit=run.gyroscope.w0)

@@ -13,11 +13,10 @@ from pendmap.errors import InputError
 from pendmap.files import read_whole
 from pendmap.formatting import listed
 from pendmap.tables.findings import finding_of
+from pendmap.tables.programs import TRACKER, is_workbook, matlab_frame, sheet_text, tracker_frame
 from pendmap.tables.table import MOST_BYTES, decoded, readable, refuse_large, table_of
 from pendmap.tables.text import parsed
-from pendmap.tables.tracker import TRACKER, matlab_frame, tracker_frame
 from pendmap.tables.units import Heading
-from pendmap.tables.workbooks import is_workbook, sheet_text
 
 if TYPE_CHECKING:
     from pathlib import Path
