@@ -9,9 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.polynomial.legendre import legvander
 
-from pendmap.errors import InputError
 from pendmap.formatting import counted
-from pendmap.records.by_hand import by_hand
 from pendmap.records.experiment import Gyroscope
 from pendmap.signal.half_cycles import swings
 from pendmap.signal.robust import normal_scale
@@ -57,10 +55,7 @@ def _finite(work: Work, what: str, *values: Floats) -> Finding | None:
     """Remove rows in which a required channel has no number."""
     good = np.all([np.isfinite(v) for v in values], axis=0)
     if good.size and not good.any():
-        raise InputError(
-            f"{work.where}: the {what} must be numbers, no row has a number for it"
-            f"{work.other('angle')}"
-        )
+        work.refuse(f"the {what} must be numbers, no row has a number for it", **work.other())
     finding = work.leave_out(~good, "angle-missing", "row", channel=what)
     work.refuse_short()
     return finding
@@ -85,10 +80,7 @@ def _circle_angle(work: Work, x: Floats, y: Floats) -> Finding:
     middle = np.array([np.median(x), np.median(y)])
     size = float(np.hypot(np.ptp(x), np.ptp(y)))
     if not size or not math.isfinite(size):
-        raise InputError(
-            f"{work.where}: pixel_x and pixel_y must show a swing, they do not move"
-            f"{work.other('angle')}"
-        )
+        work.refuse("pixel_x and pixel_y must show a swing, they do not move", **work.other())
     u, v = (x - middle[0]) / size, (y - middle[1]) / size
     scaled = 2 * (work.time - work.time[0]) / max(float(np.ptp(work.time)), 1e-12) - 1
     still, moved = (_circle(u, v, legvander(scaled, degree)) for degree in (0, DRIFT_DEGREE))
@@ -96,10 +88,11 @@ def _circle_angle(work: Work, x: Floats, y: Floats) -> Finding:
     (radius, a), b, error, rms = moved if drifts else still
     spread = math.sqrt(float(np.var(u) + np.var(v)))
     if not error < MOST_RADIUS_ERROR * radius or rms > OFF_CIRCLE * spread:
-        more = by_hand(work.where, angle=work.columns["pixel_x"], angle_scale=2.5)
-        raise InputError(
-            f"{work.where}: pixel_x and pixel_y must be positions of a bob on a circle,"
-            f" they lie on none; small swings .4 from the pivot: {more}"
+        work.refuse(
+            "pixel_x and pixel_y must be positions of a bob on a circle, they lie on none; small"
+            " swings .4 from the pivot",
+            angle=work.columns["pixel_x"],
+            angle_scale=2.5,
         )
     speed = np.hypot(np.gradient(u, work.time), np.gradient(v, work.time))
     quick = speed >= np.quantile(speed, 0.8)
@@ -151,11 +144,9 @@ def missing(work: Work) -> Finding | None:
     huge = np.abs(work.theta) > LARGEST_ANGLE
     if np.mean(huge) > MOST_HUGE:
         largest = float(np.nanmax(np.abs(work.theta)))
-        raise InputError(
-            f"{work.where}: angles must be up to {LARGEST_ANGLE:g} rad, got {largest:.3g} rad, too"
-            " large for a pendulum, as counts of 4096 a turn would be:"
-            f" {by_hand(work.where, angle_scale=math.tau / 4096)}"
-        )
+        text = f"angles must be up to {LARGEST_ANGLE:g} rad, got {largest:.3g} rad, too large for a"
+        text += " pendulum, as counts of 4096 a turn would be"
+        work.refuse(text, angle_scale=math.tau / 4096)
     return _finite(work, "angle", np.where(huge, math.nan, work.theta))
 
 

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.errors import InputError
 from pendmap.formatting import counted, listed, moment
 from pendmap.records.angle import gyroscope_of
 from pendmap.records.experiment import Segment
@@ -33,9 +32,7 @@ def moves(work: Work) -> Finding | None:
     low, high = float(work.time[0]), float(work.time[-1])
     work.segments = [Segment("motion", low, high, used=True)]
     if np.ptp(work.theta) == 0:
-        raise InputError(
-            f"{work.where}: must be a motion, the angle never changes{work.other('angle')}"
-        )
+        work.refuse("must be a motion, the angle never changes", **work.other())
     _measure_noise(work)
     good = work.theta[work.trusted]
     spread = float(np.ptp(good)) if good.size else 0.0

@@ -13,9 +13,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.errors import InputError
 from pendmap.model.quantities import GRAVITY
-from pendmap.records.by_hand import by_hand
 from pendmap.signal.half_cycles import after_turns, swings
 from pendmap.signal.robust import Z95, normal_scale
 from pendmap.tables.units import DEGREE
@@ -191,10 +189,7 @@ def seconds(work: Work) -> Finding | None:
         if "time" in work.declared:
             return work.finding("time-unit.declared", period=small, unit=name)
         if math.isfinite(work.plan.from_s) or math.isfinite(work.plan.to_s):
-            raise InputError(
-                f"{work.where}: from_s and to_s must be in s, the times look like {name}:"
-                f" {by_hand(work.where, time_unit=name)}"
-            )
+            work.refuse(f"from_s and to_s must be in s, the times look like {name}", time_unit=name)
         finding = work.finding("time-unit.short", period=small, unit=name)
         work.time *= factor
         work.theta *= factor if work.integrated else 1.0
@@ -237,10 +232,11 @@ def one_sided(work: Work) -> None:
         return
     less, more = sorted(np.abs(ends[1] - ends[0]).tolist())
     if less < ONE_SIDED * more and more > ONE_SIDED * float(np.ptp(work.theta)):
-        raise InputError(
-            f"{work.where}: angles must swing to both sides of the rest, and the decay of"
+        work.refuse(
+            "angles must swing to both sides of the rest, and the decay of"
             f" {work.columns.get('angle')!r} is on one side of it, as of a cosine, a height or an"
-            f" absolute value: another column must be the angle{work.other('angle')}"
+            " absolute value: another column must be the angle",
+            **work.other(),
         )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
@@ -143,18 +143,22 @@ class Work:
             parts.append(part)
         return parts, shared
 
-    def other(self, option: str) -> str:
-        """Return the end of a message: the command that reads another column, if there is one."""
-        return f": {by_hand(self.where, **{option: self.unused[0]})}" if self.unused else ""
+    def other(self) -> dict[str, object]:
+        """Return the option that reads another column as the angle, if there is one."""
+        return {"angle": self.unused[0]} if self.unused else {}
+
+    def refuse(self, text: str, **options: object) -> NoReturn:
+        """Raise InputError, with the command that helps by its options, if there are any."""
+        more = f": {by_hand(self.where, **options)}" if options else ""
+        raise InputError(f"{self.where}: {text}{more}")
 
     def refuse_short(self) -> None:
         """Raise InputError if there are too few samples for a record."""
         least = _FEWEST_PEAKS if self.peaks_only else FEWEST_SAMPLES
         if self.time.size < least:
-            raise InputError(
-                f"{self.where}: must have {least} samples or more with time and angle, got"
-                f" {counted(self.time.size, 'sample')}{self.other('angle')}"
-            )
+            got = counted(self.time.size, "sample")
+            text = f"must have {least} samples or more with time and angle, got {got}"
+            self.refuse(text, **self.other())
 
 
 def _within(part: Finding | Segment, begin: float, end: float) -> bool:
