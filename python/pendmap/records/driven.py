@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.signal.half_cycles import after_turns, swings
-from pendmap.signal.robust import widened
+from pendmap.signal.local_polynomial import local_fit
+from pendmap.signal.robust import normal_scale, widened
 
 if TYPE_CHECKING:
     from pendmap.records.work import Work
@@ -28,6 +29,8 @@ LEAST_ERROR: Final = 1e-3  # Least error of an amplitude, over the largest
 SUDDEN: Final = 0.1  # Least change of an amplitude by a push, over the amplitude
 GAP: Final = 4.0  # Intervals without a reading that make a half cycle uncertain
 TWICE: Final = 2.0  # Loss by a push over that of the swing before
+A_SWING: Final = 40  # Readings of a swing from which its speed is computed
+LAST: Final = 4.0  # Swings at each end of a motion in which a hand may have it
 
 
 def half_cycles(work: Work, part: Stretch) -> tuple[Indices, Floats, Swings]:
@@ -73,6 +76,39 @@ def pushes(work: Work, part: Stretch) -> list[Stretch]:
     edges = np.searchsorted(work.time, np.stack((time[after - 1], time[after])))
     ends = [part[0], *edges.T.ravel().tolist(), part[1]]
     return list(zip(ends[::2], ends[1::2], strict=True))
+
+
+def untouched(work: Work, part: Stretch) -> Stretch:
+    """Return a motion from half a swing after, and to half a swing before, a hand has it."""
+    half = work.period / 2
+    ends = work.time[part[0]] - half, work.time[part[1] - 1] + half
+    low, high = np.searchsorted(work.time, ends).tolist()
+    good, theta, _ = half_cycles(work, (low, high))
+    time = work.time[good]
+    if work.edges or work.angle_source or time[-1] - time[0] < LAST * work.period:
+        return part
+    inner = np.quantile(theta[theta.size // 4 : -theta.size // 4], (0.02, 0.98))
+    stride = max(round(2 * half / A_SWING / float(np.median(np.diff(time)))), 1)
+    fit = local_fit(time, theta, stride=stride)
+    # By the energy the amplitude is known at each instant, also of a half cycle that is cut.
+    bend = 2 * np.sin((theta[fit.middle] - inner.mean()) / 2)
+    at, size = time[fit.middle][::stride], np.hypot(fit.slope * half / math.pi, bend)[::stride]
+    end, begin = _taken(at, size, half, work.limit), _taken(-at[::-1], size[::-1], half, work.limit)
+    first, last = np.searchsorted(work.time, (-begin, end)).tolist()
+    return max(part[0], first), min(part[1], last)
+
+
+def _taken(time: Floats, size: Floats, half: float, limit: float) -> float:
+    """Return the time half a swing before an amplitude changes as by a push in the last swings."""
+    before = np.interp(time - 2 * half, time, size)  # an offset of the middle is the same
+    loss = before - size
+    for k in np.flatnonzero((time > time[-1] - 2 * LAST * half) & (before > 4 * limit)).tolist():
+        usual = loss[(time < time[k] - half) & (time > time[k] - 5 * half)]
+        middle = float(np.median(usual)) if usual.size else math.inf
+        much = SUDDEN * before[k] + CERTAIN * normal_scale(usual - middle)
+        if abs(loss[k]) > TWICE * abs(middle) + much:
+            return float(time[k]) - half
+    return math.inf
 
 
 def free_part(work: Work, part: Stretch) -> Stretch:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.formatting import counted, listed
-from pendmap.records.driven import GAP, free_part, half_cycles, pushes
+from pendmap.records.driven import GAP, free_part, half_cycles, pushes, untouched
 from pendmap.signal.robust import stretches
 
 if TYPE_CHECKING:
@@ -32,7 +32,8 @@ def releases(work: Work, parts: list[Stretch]) -> list[Stretch]:
     pieces = parts
     if not (math.isfinite(work.plan.from_s) and math.isfinite(work.plan.to_s)):  # not by hand
         pieces = [free_part(work, piece) for part in parts for piece in grown(work, part)]
-        pieces = [part for piece in pieces for part in pushes(work, piece)]
+        pieces = [untouched(work, part) for piece in pieces for part in pushes(work, piece)]
+        pieces = [part for part in pieces if part[1] - part[0] > 5]
     begin = held_short(work, pieces[0]) if pieces else None
     return pieces if begin is None else [(begin, pieces[0][1]), *pieces[1:]]
 
@@ -105,16 +106,21 @@ def held_short(work: Work, part: Stretch) -> int | None:
     good = np.flatnonzero(work.trusted[low:high]) + low
     level = float(np.median(work.theta[low : low + 5]))
     seen = max(6 * work.noise, 1.5 * work.count, 1e-4)
-    off = np.abs(work.theta[good] - level) > seen
-    away = np.flatnonzero(off[:-2] & off[1:-1] & off[2:])
+    moved = np.abs(work.theta[good] - level)
+    away = np.flatnonzero(np.minimum(moved[:-2], np.minimum(moved[1:-1], moved[2:])) > seen)
     pull = abs(math.sin(level - work.middle))
     if not away.size or pull < NEAR_UPRIGHT or not work.trusted[low : low + 5].all():
         return None
-    left = int(good[away[0]])
-    usual = math.sqrt(2 * seen / pull) * work.period / (2 * math.pi)
-    interval = float(np.median(np.diff(work.time)))
-    held = work.time[left] - work.time[low] > HELD_LONGER * usual + 4 * interval
-    return left if held else None
+    far = max(min(LEFT, abs(level - work.middle) / 4), 2 * seen)
+    left, fallen = int(good[away[0]]), int(good[int(np.argmax(moved > far))])
+
+    def held(begin: int, end: int, way: float) -> bool:
+        usual = math.sqrt(2 * way / pull) * work.period / (2 * math.pi)
+        longest = HELD_LONGER * usual + 4 * float(np.median(np.diff(work.time)))
+        return bool(work.time[end] - work.time[begin] > longest)
+
+    # A hand that trembles moves the pendulum before it leaves the hold.
+    return fallen if held(left, fallen, far) else left if held(low, left, seen) else None
 
 
 def edges_of(values: Floats, edge: str | None = None) -> tuple[Indices, str]:
