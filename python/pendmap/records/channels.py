@@ -20,6 +20,7 @@ from pendmap.records.guesses import (
     head_of,
     in_order,
     likely,
+    on_circle,
 )
 from pendmap.records.work import Work
 from pendmap.tables.findings import finding_of
@@ -175,7 +176,9 @@ def _missing(table: Table, places: Mapping[str, int], where: str, *, timed: bool
         columns["angle"] = min(free)
     axes = [] if {*ANGLE_CHANNELS} & {*places} else axes_of(table)
     if axes:
-        columns, why = columns | {"velocity": axes[0]}, ", where a sensor has the axes x, y and z"
+        arc = on_circle(*table.values[:, axes[:2]].T)
+        columns |= {"pixel_x": axes[0], "pixel_y": axes[1]} if arc else {"velocity": axes[0]}
+        why = ", where a sensor or a place has the axes x, y and z"
         columns.pop("angle", None)
     if not timed:
         known = [c for c in places if c in {"angle", "velocity"} or c.startswith("pixel")]

@@ -172,7 +172,7 @@ def held_or_at_rest(work: Work) -> None:
         return
     first, last = work.segments[0], work.segments[-1]
     begins = {"held": "held-start", "driven": "driven-start"}.get(first.what)
-    ends = {"driven": "braked-end", "rest": "rest-tail"}.get(last.what)
+    ends = {"driven": "braked-end", "handled": "handled-end", "rest": "rest-tail"}.get(last.what)
     if begins:
         begin = moment(work.segments[1].from_s)
         work.note(begins, span=(first.from_s, first.to_s), begin=begin)

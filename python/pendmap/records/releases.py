@@ -15,7 +15,8 @@ import numpy as np
 
 from pendmap.formatting import counted, listed
 from pendmap.signal.half_cycles import after_turns, swings
-from pendmap.signal.robust import stretches, widened
+from pendmap.signal.local_polynomial import local_fit
+from pendmap.signal.robust import normal_scale, stretches, widened
 
 if TYPE_CHECKING:
     from pendmap.records.work import Work
@@ -38,7 +39,8 @@ def releases(work: Work, parts: list[Stretch]) -> list[Stretch]:
     pieces = parts
     if not (math.isfinite(work.plan.from_s) and math.isfinite(work.plan.to_s)):  # not by hand
         pieces = [free_part(work, piece) for part in parts for piece in grown(work, part)]
-        pieces = [part for piece in pieces for part in pushes(work, piece)]
+        pieces = [untouched(work, part) for piece in pieces for part in pushes(work, piece)]
+        pieces = [part for part in pieces if part[1] - part[0] > 5]
     begin = held_short(work, pieces[0]) if pieces else None
     return pieces if begin is None else [(begin, pieces[0][1]), *pieces[1:]]
 
@@ -111,16 +113,21 @@ def held_short(work: Work, part: Stretch) -> int | None:
     good = np.flatnonzero(work.trusted[low:high]) + low
     level = float(np.median(work.theta[low : low + 5]))
     seen = max(6 * work.noise, 1.5 * work.count, 1e-4)
-    off = np.abs(work.theta[good] - level) > seen
-    away = np.flatnonzero(off[:-2] & off[1:-1] & off[2:])
+    moved = np.abs(work.theta[good] - level)
+    away = np.flatnonzero(np.minimum(moved[:-2], np.minimum(moved[1:-1], moved[2:])) > seen)
     pull = abs(math.sin(level - work.middle))
     if not away.size or pull < NEAR_UPRIGHT or not work.trusted[low : low + 5].all():
         return None
-    left = int(good[away[0]])
-    usual = math.sqrt(2 * seen / pull) * work.period / (2 * math.pi)
-    interval = float(np.median(np.diff(work.time)))
-    held = work.time[left] - work.time[low] > HELD_LONGER * usual + 4 * interval
-    return left if held else None
+    far = max(min(LEFT, abs(level - work.middle) / 4), 2 * seen)
+    left, fallen = int(good[away[0]]), int(good[int(np.argmax(moved > far))])
+
+    def held(begin: int, end: int, way: float) -> bool:
+        usual = math.sqrt(2 * way / pull) * work.period / (2 * math.pi)
+        longest = HELD_LONGER * usual + 4 * float(np.median(np.diff(work.time)))
+        return bool(work.time[end] - work.time[begin] > longest)
+
+    # A hand that trembles moves the pendulum before it leaves the hold.
+    return fallen if held(left, fallen, far) else left if held(low, left, seen) else None
 
 
 def edges_of(values: Floats, edge: str | None = None) -> tuple[Indices, str]:
@@ -172,6 +179,8 @@ LEAST_ERROR: Final = 1e-3  # Least error of an amplitude, over the largest
 SUDDEN: Final = 0.1  # Least change of an amplitude by a push, over the amplitude
 GAP: Final = 4.0  # Intervals without a reading that make a half cycle uncertain
 TWICE: Final = 2.0  # Loss by a push over that of the swing before
+A_SWING: Final = 40  # Readings of a swing from which its speed is computed
+LAST: Final = 4.0  # Swings at each end of a motion in which a hand may have it
 
 
 def half_cycles(work: Work, part: Stretch) -> tuple[Indices, Floats, Swings]:
@@ -217,6 +226,39 @@ def pushes(work: Work, part: Stretch) -> list[Stretch]:
     edges = np.searchsorted(work.time, np.stack((time[after - 1], time[after])))
     ends = [part[0], *edges.T.ravel().tolist(), part[1]]
     return list(zip(ends[::2], ends[1::2], strict=True))
+
+
+def untouched(work: Work, part: Stretch) -> Stretch:
+    """Return a motion from half a swing after, and to half a swing before, a hand has it."""
+    half = work.period / 2
+    ends = work.time[part[0]] - half, work.time[part[1] - 1] + half
+    low, high = np.searchsorted(work.time, ends).tolist()
+    good, theta, _ = half_cycles(work, (low, high))
+    time = work.time[good]
+    if work.edges or time[-1] - time[0] < LAST * work.period:
+        return part
+    inner = np.quantile(theta[theta.size // 4 : -theta.size // 4], (0.02, 0.98))
+    stride = max(round(2 * half / A_SWING / float(np.median(np.diff(time)))), 1)
+    fit = local_fit(time, theta, stride=stride)
+    # By the energy the amplitude is known at each instant, also of a half cycle that is cut.
+    bend = 2 * np.sin((theta[fit.middle] - inner.mean()) / 2)
+    at, size = time[fit.middle][::stride], np.hypot(fit.slope * half / math.pi, bend)[::stride]
+    end, begin = _taken(at, size, half, work.limit), _taken(-at[::-1], size[::-1], half, work.limit)
+    first, last = np.searchsorted(work.time, (-begin, end)).tolist()
+    return max(part[0], first), min(part[1], last)
+
+
+def _taken(time: Floats, size: Floats, half: float, limit: float) -> float:
+    """Return the time half a swing before an amplitude changes as by a push in the last swings."""
+    before = np.interp(time - 2 * half, time, size)  # an offset of the middle is the same
+    loss = before - size
+    for k in np.flatnonzero((time > time[-1] - 2 * LAST * half) & (before > 4 * limit)).tolist():
+        usual = loss[(time < time[k] - half) & (time > time[k] - 5 * half)]
+        middle = float(np.median(usual)) if usual.size else math.inf
+        much = SUDDEN * before[k] + CERTAIN * normal_scale(usual - middle)
+        if abs(loss[k]) > TWICE * abs(middle) + much:
+            return float(time[k]) - half
+    return math.inf
 
 
 def free_part(work: Work, part: Stretch) -> Stretch:

@@ -29,8 +29,9 @@ NYQUIST: Final = 2.0  # Fewest readings per period of the drive that resolve it
 LEFT_OUT: Final = 0.1  # Share of readings in motion that a fit may leave out without a warning
 MOVING: Final = ("motion", "driven", "handled")  # Segments that may belong to a decay
 # Findings that leave readings in motion out
-REASONS: Final = ["braked-end", "clipped", "driven-start", "frozen", "missed-counts", "outliers"]
-LEAVES_OUT: Final = [*REASONS, "several-releases", "trigger-release"]
+ENDS: Final = ["braked-end", "driven-start", "handled-end", "held-start"]
+REASONS: Final = ["clipped", "frozen", "missed-counts", "outliers"]
+LEAVES_OUT: Final = [*ENDS, *REASONS, "several-releases", "trigger-release"]
 ON_STEPS: Final = 0.12  # Greatest rms distance from multiples of a step, in steps; chance: 0.29
 EDGE_SHARE: Final = 0.95  # Share of single-count steps above which a record is a log of edges
 FEWEST_EDGES: Final = 50  # Fewest readings from which edges are recognized

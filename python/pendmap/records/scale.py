@@ -16,7 +16,7 @@ import numpy as np
 from pendmap.model.quantities import GRAVITY
 from pendmap.signal.half_cycles import after_turns, swings
 from pendmap.signal.robust import Z95, normal_scale
-from pendmap.tables.units import DEGREE
+from pendmap.tables.units import DEGREE, name_and_unit
 
 if TYPE_CHECKING:
     from pendmap.records.experiment import Run
@@ -211,8 +211,13 @@ def radians(work: Work) -> Finding | None:
     largest = float(np.max(periods.amplitude))
     if largest <= math.pi:  # swings are possible
         return None
-    if largest * DEGREE > math.pi or ("velocity" if work.integrated else "angle") in work.declared:
+    channel = "velocity" if work.integrated else "angle"
+    unit = name_and_unit(work.columns.get(channel, ""))[1] or "rad"
+    if channel in work.declared or "rad" not in unit:
         return work.finding("angle-unit.wrong", largest=largest)
+    if largest * DEGREE > math.pi:
+        text = f"swings of {largest:.4g} rad need --angle-scale, or"
+        work.refuse(text, angle_unit="counts", counts_per_turn=2400)
     work.theta *= DEGREE
     if work.integrated:
         work.extra["velocity"] = work.extra["velocity"] * DEGREE
@@ -224,7 +229,9 @@ def radians(work: Work) -> Finding | None:
 
 def one_sided(work: Work) -> None:
     """Raise InputError for readings of which one side decays alone: no angle does that."""
-    first, *_, last = np.array_split(work.theta[work.trusted], 4)
+    theta = work.theta[work.trusted]
+    moving = np.flatnonzero(np.abs(theta - theta[-1]) > work.limit) if theta.size else theta
+    first, *_, last = np.array_split(theta[: moving[-1] + 1] if moving.size else theta, 4)
     if not work.free or not last.size:
         return
     ends = [np.quantile(part, (0.02, 0.98)) for part in (first, last)]

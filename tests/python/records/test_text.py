@@ -62,6 +62,8 @@ FILES: dict[str, tuple[list[str], str]] = {
     "a clock of twelve hours": (["Time,Angle", *lines("{n:%I:%M:%S.%f} PM,{a:.5f}")], "Time Angle"),
     "one without am and pm": (["Time,Angle", *lines("{n:%I:%M:%S.%f},{a:.5f}")], "Time Angle"),
     "minutes and seconds": (["Time,Angle", *lines("{m}:{t:05.2f},{a:.5f}")], "Time Angle"),
+    "hundredths behind the seconds": (["T Angle", *[f"0:00:{k // 25:02d}:{k % 25 * 4:02d} {a:.5f}" for k, a in enumerate(THETA)]], "T Angle"),
+    "frames behind the seconds": (["T Angle", *[f"0:00:{k // 25:02d}:{k % 25:02d} {a:.5f}" for k, a in enumerate(THETA)]], "T Angle"),
     "commas of logging": (["Time,Angle", *[re.sub(r"\.(\d{3})\d+,", r",\1,", line) for line in lines("{d:%H:%M:%S.%f},{a:.5f}")]], "Time Angle"),
     "dates, day first": (["Datum;Winkel", *lines("{d:%d.%m.%Y %H:%M:%S.%f};{a:.5f}")], "Datum Winkel"),
     "dates, month first": (["Date,Angle", *lines("{d:%m/%d/%Y %I:%M:%S.%f %p},{a:.5f}")], "t_s Angle"),
@@ -83,6 +85,16 @@ def test_a_text_table_is_read(tmp_path: Path, kind: str) -> None:
     np.testing.assert_allclose(run.time - run.time[0], TIME, atol=1e-5)
     np.testing.assert_allclose(run.theta, THETA, atol=1e-5)
     assert ("tables-behind" in found(run)) == (kind == "a spectrum behind")
+
+
+@pytest.mark.parametrize("lost", ["-999", "9999.0", "---", "NaN"])
+def test_lost_readings_are_left_out(tmp_path: Path, lost: str) -> None:
+    cells = [lost if k % 40 == 7 else f"{a:.5f}" for k, a in enumerate(THETA)]
+    content = ["t,theta", *[f"{t:.2f},{cell}" for t, cell in zip(TIME, cells, strict=True)]]
+    run = read(tmp_path, "\n".join(content) + "\n")
+    there = np.arange(TIME.size) % 40 != 7
+    np.testing.assert_allclose(run.theta, THETA[there], atol=1e-5)
+    assert run.trusted.all()
 
 
 @pytest.mark.parametrize(
