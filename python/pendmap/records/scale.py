@@ -216,7 +216,7 @@ def radians(work: Work) -> Finding | None:
     if channel in work.declared or "rad" not in unit:
         return work.finding("angle-unit.wrong", largest=largest)
     if largest * DEGREE > math.pi:
-        text = f"swings of {largest:.4g} rad need --angle-scale, or"
+        text = f"swings of {largest:.4g} rad need --angle-scale, or the counts of a turn"
         work.refuse(text, angle_unit="counts", counts_per_turn=2400)
     work.theta *= DEGREE
     if work.integrated:
