@@ -5,7 +5,7 @@ from __future__ import annotations
 import abc
 import dataclasses
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple, Protocol
 
 import numpy as np
 import pandas as pd
@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     Covariance = tuple[Sequence[str], Floats]
     import os
 
-    from pendmap.identification import IdentificationReport
 
 EXACT: Final = 1e-9  # Nominal noise that sets the integrator's tolerance of a prediction, rad
 STEP: Final = 1e-3  # Time between samples that are added, since a run has three or more, s
@@ -296,7 +295,12 @@ SUFFIXES: Final = (".csv", ".xlsx", ".mat")
 MOST_ROWS: Final = 2**20 - 1  # Rows of a sheet of Excel below its header
 
 
-def write_readings(report: IdentificationReport, path: str | os.PathLike[str]) -> Path:
+class _Read(Protocol):
+    @property
+    def readings(self) -> pd.DataFrame: ...
+
+
+def write_readings(report: _Read, path: str | os.PathLike[str]) -> Path:
     """Write the ``readings`` of a report; ``.mat`` has a variable a column, runs as cells."""
     table, suffix = report.readings, Path(path).suffix.lower()
     if suffix == ".xlsx" and len(table) > MOST_ROWS:
