@@ -29,7 +29,6 @@ LEAST_ERROR: Final = 1e-3  # Least error of an amplitude, over the largest
 SUDDEN: Final = 0.1  # Least change of an amplitude by a push, over the amplitude
 GAP: Final = 4.0  # Intervals without a reading that make a half cycle uncertain
 TWICE: Final = 2.0  # Loss by a push over that of the swing before
-A_SWING: Final = 40  # Readings of a swing from which its speed is computed
 LAST: Final = 4.0  # Swings at each end of a motion in which a hand may have it
 
 
@@ -81,16 +80,14 @@ def pushes(work: Work, part: Stretch) -> list[Stretch]:
 def untouched(work: Work, part: Stretch) -> Stretch:
     """Return a motion from half a swing after, and to half a swing before, a hand has it."""
     half = work.period / 2
-    ends = work.time[part[0]] - half, work.time[part[1] - 1] + half
-    low, high = np.searchsorted(work.time, ends).tolist()
-    good, theta, _ = half_cycles(work, (low, high))
+    wide = work.time[part[0]] - half, work.time[part[1] - 1] + half
+    good, theta, _ = half_cycles(work, tuple(np.searchsorted(work.time, wide).tolist()))
     time = work.time[good]
     if work.edges or work.angle_source or time[-1] - time[0] < LAST * work.period:
         return part
     inner = np.quantile(theta[theta.size // 4 : -theta.size // 4], (0.02, 0.98))
-    stride = max(round(2 * half / A_SWING / float(np.median(np.diff(time)))), 1)
+    stride = max(round(half / 20 / float(np.median(np.diff(time)))), 1)  # 40 a swing
     fit = local_fit(time, theta, stride=stride)
-    # By the energy the amplitude is known at each instant, also of a half cycle that is cut.
     bend = 2 * np.sin((theta[fit.middle] - inner.mean()) / 2)
     at, size = time[fit.middle][::stride], np.hypot(fit.slope * half / math.pi, bend)[::stride]
     end, begin = _taken(at, size, half, work.limit), _taken(-at[::-1], size[::-1], half, work.limit)
@@ -99,7 +96,7 @@ def untouched(work: Work, part: Stretch) -> Stretch:
 
 
 def _taken(time: Floats, size: Floats, half: float, limit: float) -> float:
-    """Return the time half a swing before an amplitude changes as by a push in the last swings."""
+    """Return the time half a swing before the energy changes as by a push in the last swings."""
     before = np.interp(time - 2 * half, time, size)  # an offset of the middle is the same
     loss = before - size
     for k in np.flatnonzero((time > time[-1] - 2 * LAST * half) & (before > 4 * limit)).tolist():

@@ -113,14 +113,10 @@ def held_short(work: Work, part: Stretch) -> int | None:
         return None
     far = max(min(LEFT, abs(level - work.middle) / 4), 2 * seen)
     left, fallen = int(good[away[0]]), int(good[int(np.argmax(moved > far))])
-
-    def held(begin: int, end: int, way: float) -> bool:
-        usual = math.sqrt(2 * way / pull) * work.period / (2 * math.pi)
-        longest = HELD_LONGER * usual + 4 * float(np.median(np.diff(work.time)))
-        return bool(work.time[end] - work.time[begin] > longest)
-
-    # A hand that trembles moves the pendulum before it leaves the hold.
-    return fallen if held(left, fallen, far) else left if held(low, left, seen) else None
+    usual = np.sqrt(2 * np.array((seen, far)) / pull) * work.period / math.tau
+    longest = HELD_LONGER * usual + 4 * float(np.median(np.diff(work.time)))
+    held, trembles = np.diff(work.time[[low, left, fallen]]) > longest
+    return fallen if trembles else left if held else None
 
 
 def edges_of(values: Floats, edge: str | None = None) -> tuple[Indices, str]:
