@@ -115,9 +115,8 @@ def column_of(cells: list[str], decimal: str) -> Column:
     odd[odd] = ~texts[odd].str.lower().isin(_NOTHING).to_numpy()
     words = texts[odd]
     size, nines = np.abs(values), np.isin(np.abs(values), _NINES)
-    values[nines & (size > 2 * np.max(size, where=~nines & np.isfinite(size), initial=0.0))] = (
-        np.nan
-    )
+    others = np.max(size, where=~nines & np.isfinite(size), initial=0.0)
+    values[nines & (size > 2 * others)] = np.nan
     if words.empty:
         return Column("number", values, odd, base)
     middle = words.iloc[words.size // 2]
