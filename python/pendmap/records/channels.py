@@ -29,6 +29,7 @@ from pendmap.tables.units import (
     CHANNELS,
     LENGTHS,
     PIVOT_UNITS,
+    RAW,
     Heading,
     name_and_unit,
     spelling,
@@ -199,6 +200,8 @@ def _missing(table: Table, places: Mapping[str, int], where: str, *, timed: bool
             length = 400 if unit == "px" else 0.4 / LENGTHS[unit]
             why = f", where a place is over its distance from the pivot, here {length:g} {unit}"
             options = {"angle_scale": f"{1 / length:.4g}"}
+        elif unit in RAW:
+            options = {"angle_scale": 1}
         elif heading.unit is not None:
             why = f", where {heading.unit!r} is not known as a unit"
             options = {"angle_unit": "deg"}

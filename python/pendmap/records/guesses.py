@@ -101,10 +101,7 @@ def _nameless(head: Heading, letters: str) -> bool:
 
 
 def axes_of(table: Table) -> list[int]:
-    """Return the columns x, y, z of a sensor without a unit, or of a place.
-
-    The widest is first, and then that which is on an arc with it.
-    """
+    """Return the columns x, y, z of a sensor or a place: the widest, then that on its arc."""
     columns, names = table.values.T, [name.strip().lower() for name in table.names]
     for k in range(len(names) - 2):
         heads = [Heading.of(name) for name in names[k : k + 3]]

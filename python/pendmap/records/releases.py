@@ -120,14 +120,10 @@ def held_short(work: Work, part: Stretch) -> int | None:
         return None
     far = max(min(LEFT, abs(level - work.middle) / 4), 2 * seen)
     left, fallen = int(good[away[0]]), int(good[int(np.argmax(moved > far))])
-
-    def held(begin: int, end: int, way: float) -> bool:
-        usual = math.sqrt(2 * way / pull) * work.period / (2 * math.pi)
-        longest = HELD_LONGER * usual + 4 * float(np.median(np.diff(work.time)))
-        return bool(work.time[end] - work.time[begin] > longest)
-
-    # A hand that trembles moves the pendulum before it leaves the hold.
-    return fallen if held(left, fallen, far) else left if held(low, left, seen) else None
+    usual = np.sqrt(2 * np.array((seen, far)) / pull) * work.period / math.tau
+    longest = HELD_LONGER * usual + 4 * float(np.median(np.diff(work.time)))
+    held, trembles = np.diff(work.time[[low, left, fallen]]) > longest
+    return fallen if trembles else left if held else None
 
 
 def edges_of(values: Floats, edge: str | None = None) -> tuple[Indices, str]:
@@ -179,7 +175,6 @@ LEAST_ERROR: Final = 1e-3  # Least error of an amplitude, over the largest
 SUDDEN: Final = 0.1  # Least change of an amplitude by a push, over the amplitude
 GAP: Final = 4.0  # Intervals without a reading that make a half cycle uncertain
 TWICE: Final = 2.0  # Loss by a push over that of the swing before
-A_SWING: Final = 40  # Readings of a swing from which its speed is computed
 LAST: Final = 4.0  # Swings at each end of a motion in which a hand may have it
 
 
@@ -231,16 +226,14 @@ def pushes(work: Work, part: Stretch) -> list[Stretch]:
 def untouched(work: Work, part: Stretch) -> Stretch:
     """Return a motion from half a swing after, and to half a swing before, a hand has it."""
     half = work.period / 2
-    ends = work.time[part[0]] - half, work.time[part[1] - 1] + half
-    low, high = np.searchsorted(work.time, ends).tolist()
-    good, theta, _ = half_cycles(work, (low, high))
+    wide = work.time[part[0]] - half, work.time[part[1] - 1] + half
+    good, theta, _ = half_cycles(work, tuple(np.searchsorted(work.time, wide).tolist()))
     time = work.time[good]
     if work.edges or time[-1] - time[0] < LAST * work.period:
         return part
     inner = np.quantile(theta[theta.size // 4 : -theta.size // 4], (0.02, 0.98))
-    stride = max(round(2 * half / A_SWING / float(np.median(np.diff(time)))), 1)
+    stride = max(round(half / 20 / float(np.median(np.diff(time)))), 1)  # 40 a swing
     fit = local_fit(time, theta, stride=stride)
-    # By the energy the amplitude is known at each instant, also of a half cycle that is cut.
     bend = 2 * np.sin((theta[fit.middle] - inner.mean()) / 2)
     at, size = time[fit.middle][::stride], np.hypot(fit.slope * half / math.pi, bend)[::stride]
     end, begin = _taken(at, size, half, work.limit), _taken(-at[::-1], size[::-1], half, work.limit)
@@ -249,7 +242,7 @@ def untouched(work: Work, part: Stretch) -> Stretch:
 
 
 def _taken(time: Floats, size: Floats, half: float, limit: float) -> float:
-    """Return the time half a swing before an amplitude changes as by a push in the last swings."""
+    """Return the time half a swing before the energy changes as by a push in the last swings."""
     before = np.interp(time - 2 * half, time, size)  # an offset of the middle is the same
     loss = before - size
     for k in np.flatnonzero((time > time[-1] - 2 * LAST * half) & (before > 4 * limit)).tolist():

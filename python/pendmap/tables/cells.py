@@ -82,8 +82,8 @@ class Column:
 
 
 def split(line: str, delimiter: str) -> list[str]:
-    """Return the cells of a line; the Arduino IDE sets an arrow behind the time of day."""
-    line = line.replace(" -> ", delimiter, 1)
+    """Return the cells of a line; an arrow or brackets set the time of a log apart."""
+    line = re.sub(r"^\[([^]]+)\] ", r"\1 -> ", line).replace(" -> ", delimiter, 1)
     if '"' in line:
         line = " ".join(line.split()) if delimiter == " " else line
         return next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))
@@ -173,9 +173,8 @@ def clock_of(cells: pd.Series[str]) -> tuple[Floats, str] | None:
     day, clock, point, ms, half, zone = (parts.loc[good, name] for name in _CLOCK.groupindex)
     short = clock.str.count(":") == 1
     if ms.str.len().max() == 2:  # hundredths of a second, or frames, of which each number occurs
-        frames = ms.astype(float)
-        rate = frames.max() + 1 if frames.nunique() == frames.max() + 1 else 100
-        ms = (frames / rate).map("{:.6f}".format).str[2:]
+        rate = (frames := ms.astype(float)).nunique()
+        ms = (frames / (rate if rate == frames.max() + 1 else 100)).map("{:.6f}".format).str[2:]
     point = point.fillna(ms)
     if len(zone.unique()) > 1 or (short.any() and (form > 1 or point.isna().all())):
         return None
