@@ -71,7 +71,7 @@ FILES: dict[str, tuple[list[str], str]] = {
     "dates without marks": (["Time;Angle", *lines("{d:%Y%m%d %H:%M:%S.%f};{a:.5f}")], "Time Angle"),
     "a time beside an empty one": (["t_s,time_ms,theta_rad", *lines(",{us},{a:.5f}")], "time_ms theta_rad"),
     "an arrow": (["", *lines("{d:%H:%M:%S.%f} -> {a:.5f}")], "column 1 column 2"),
-    "brackets": (lines("[{d:%Y-%m-%d %H:%M:%S.%f}] theta: {a:.5f}"), "column 1 theta"),
+    "brackets": (lines("[{d:%Y-%m-%d %H:%M:%S.%f}] theta: {a:.5f}"), "t_s theta"),
     "date and time apart": (["Date,Time,Angle", *lines("{d:%d/%m/%Y},{d:%H:%M:%S.%f},{a:.5f}")], "Time Angle"),
     "s since 1970": (["clock,theta", *[f"{1738928443 + float(x):.2f},{y}" for x, y in (z.split() for z in lines("{t:.2f} {a:.5f}"))]], "clock theta"),
     "ns since 1970": (["time (ns),theta", *[f"{1738928443 * 10**9 + int(x)},{y}" for x, y in (z.split() for z in lines("{us} {a:.5f}"))]], "time [s] theta"),
