@@ -85,7 +85,7 @@ def test_a_lost_run_is_fitted_in_windows_or_set_aside() -> None:
     data = split_records(experiment(*runs))
     windows = [(k, 0, TIME.size, a, 0.0) for k, a in enumerate(starts.values())]
     fitted = fit_model(data, pendmap.Rig(6.2, 0.05, 0.05), ["w0"], windows=windows, steps=0)
-    assert lost_runs(data, fitted) == [2]
+    assert [*lost_runs(data.fitted, fitted.fit)] == [2]
     shorter = baseline.in_windows(data, [2])
     assert [run.longest_s for run in shorter.fitted] == [None, None, pytest.approx(TIME[-1] / 4)]
     left = baseline.set_aside(data, [2])
