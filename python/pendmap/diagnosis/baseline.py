@@ -32,7 +32,7 @@ from pendmap.model.rig import own_name
 from pendmap.tables.findings import finding_of
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Sequence
+    from collections.abc import Callable, Collection, Sequence
 
     from pendmap.comparison.data import DataSplit
     from pendmap.identification.fit import TrajectoryFit
@@ -45,7 +45,7 @@ BEGIN: Final = 0.01  # Nondimensional size at which a fit of an effect of dampin
 
 
 def fit_baseline(
-    data: DataSplit, model: Rig | None = None, without: Collection[str] = ()
+    data: DataSplit, model: Rig | None = None, without: Collection[str] = (), *, again: bool = False
 ) -> tuple[FittedModel, FittedModel | None]:
     """Fit the given model, and the physical core (None if the given model has it).
 
@@ -53,6 +53,7 @@ def fit_baseline(
     For another model the natural frequency, viscous damping and sizes of effects are fitted,
     Coulomb friction and a constant torque only if it has them. The core adds ``q th' abs(th')`` and
     the sensor's zero, except effects in ``without``. Each is also fitted from the other's motion.
+    Far above the noise all effects of damping are fitted, ``again`` only where no run is lost.
     Damping may be negative, since a bound stalls the fit.
     """
     if model is not None:
@@ -78,9 +79,9 @@ def fit_baseline(
     base = best_of(base, reduced) or base
     core = impose_physics(data, core)
     before, noise = best_of(base, core) or base, noise_rms(data.fitted)
-    if before.fit.rms < POOR * noise:
+    if before.fit.rms < POOR * noise or (again and lost_of(data, before)):
         return base, core
-    # Far above the noise scores are no guide: all effects of damping are fitted.
+    # Far above the noise scores are no guide.
     rough = {name: getattr(rig, name) for name in ("w0", *OPPOSING) if name in base.free}
     fits = []
     for name, law in library().items():
@@ -122,14 +123,14 @@ def fit_followed(
     that is lost spoils the fit to others.
     """
     base, core = fit_baseline(data, model, without)
-    change = in_windows
+    change: Callable[[DataSplit, Sequence[int]], DataSplit | None] = in_windows
     while lost := lost_of(data, best_of(base, core) or base):
         every = {*data.fitted_of, *data.held_of}
         changed = change(data, lost) if len(lost) < len(every) or change is in_windows else None
         if changed is None:
             break
         data, change = changed, set_aside
-        base, core = fit_baseline(data, model, without)
+        base, core = fit_baseline(data, model, without, again=True)
     return data, base, core
 
 
