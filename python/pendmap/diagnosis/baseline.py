@@ -45,7 +45,7 @@ BEGIN: Final = 0.01  # Nondimensional size at which a fit of an effect of dampin
 
 
 def fit_baseline(
-    data: DataSplit, model: Rig | None = None, without: Collection[str] = (), *, again: bool = False
+    data: DataSplit, model: Rig | None = None, without: Collection[str] = ()
 ) -> tuple[FittedModel, FittedModel | None]:
     """Fit the given model, and the physical core (None if the given model has it).
 
@@ -53,7 +53,6 @@ def fit_baseline(
     For another model the natural frequency, viscous damping and sizes of effects are fitted,
     Coulomb friction and a constant torque only if it has them. The core adds ``q th' abs(th')`` and
     the sensor's zero, except effects in ``without``. Each is also fitted from the other's motion.
-    Far above the noise all effects of damping are fitted, ``again`` only where no run is lost.
     Damping may be negative, since a bound stalls the fit.
     """
     if model is not None:
@@ -79,9 +78,9 @@ def fit_baseline(
     base = best_of(base, reduced) or base
     core = impose_physics(data, core)
     before, noise = best_of(base, core) or base, noise_rms(data.fitted)
-    if before.fit.rms < POOR * noise or (again and lost_of(data, before)):
+    if before.fit.rms < POOR * noise:
         return base, core
-    # Far above the noise scores are no guide.
+    # Far above the noise scores are no guide: all effects of damping are fitted.
     rough = {name: getattr(rig, name) for name in ("w0", *OPPOSING) if name in base.free}
     fits = []
     for name, law in library().items():
@@ -130,7 +129,7 @@ def fit_followed(
         if changed is None:
             break
         data, change = changed, set_aside
-        base, core = fit_baseline(data, model, without, again=True)
+        base, core = fit_baseline(data, model, without)
     return data, base, core
 
 
