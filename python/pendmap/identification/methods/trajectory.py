@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from pendmap.records import Run
 
 DRAG: Final = "quadratic_drag"  # Effect tried where viscous damping and friction do not fit
+UNFIT: Final = "the model does not fit"  # First words of the warning of it
 NEAR_UPRIGHT: Final = 0.3  # Angle from upright, rad, within which no fit may follow a run
 MOST_LEFT: Final = 0.5  # Least share of a run that is fitted from where it leaves upright
 LACKING: Final = 4.0  # Widening above which weights are equal: else the slowest would dominate
@@ -95,9 +96,8 @@ def _warnings(joint: JointFit, estimates: Mapping[str, Estimate]) -> list[str]:
             warnings.append(f"{name} is {e.value:.3g}, which is unphysical: {why}")
     if fit.widening > 1:
         warnings.append(
-            f"the model does not fit: residuals are {fit.rms / joint.noise:.3g} times the noise; "
-            f"errors are {math.sqrt(fit.widening):.2g} times as wide; an effect is missing in the "
-            "model"
+            f"{UNFIT}: residuals are {fit.rms / joint.noise:.3g} times the noise; errors are "
+            f"{math.sqrt(fit.widening):.2g} times as wide; an effect is missing in the model"
         )
     if not fit.converged:
         warnings.append("the search did not converge")
