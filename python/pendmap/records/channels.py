@@ -185,7 +185,7 @@ def _missing(table: Table, places: Mapping[str, int], where: str, *, timed: bool
         known = [c for c in places if c in {"angle", "velocity"} or c.startswith("pixel")]
         pair = [c for c in known if c.startswith("pixel")]
         columns |= {c: places[c] for c in pair or known}
-        rate = {} if "time" in columns else {"rate_hz": 100}
+        rate = {} if "time" in columns else {"rate_hz": f"{table.rate or 100:g}"}
     elif "angle" in columns and not axes:
         heading = Heading.of(table.names[columns["angle"]])
         unit = spelling(heading.unit or ("px" if heading.meaning in {"x", "y"} else ""))

@@ -65,6 +65,8 @@ def sides_of(time: Floats, theta: Floats, good: Mask, between: slice, count: flo
     sigma = max(fit.sigma, count / math.sqrt(12), 1e-9)
     inverse = np.linalg.pinv(fit.normal) * sigma**2
     (step, slip), a, b, c = fit.unknown[[1, -1]], inverse[1, 1], inverse[1, -1], inverse[-1, -1]
+    if not min(a, c) > 0:  # the readings cannot tell the two apart
+        return None
     alone = max(a * c - b * b, 1e-300)
     # Readings between the sides belong to the one before up to a place, and to the other after.
     inner = np.arange(between.start, between.stop)
