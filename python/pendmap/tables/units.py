@@ -126,7 +126,7 @@ def stated_rate(lines: Iterable[str]) -> float | None:
     The number stands behind the words, in the next cell, or in the one below.
     """
     cells = [[cell.strip() for cell in re.split(r"[,;\t:=]", _folded(line))] for line in lines]
-    for row, below in zip(cells, [*cells[1:], []], strict=True):
+    for row, below in zip(cells, [*cells[1:], []], strict=False):
         for k, cell in enumerate(row):
             words = {*_TOKENS.findall(cell)}
             sampling, rate, interval = (any(p in cell for p in parts) for parts in _SETTINGS)
@@ -228,7 +228,7 @@ def name_and_unit(header: str) -> tuple[str, str | None]:
     for name, unit in _splits(text):
         if _is_unit(unit):
             return name.strip(), unit.strip()
-    bracket = re.search(r"[\(\[\{]([^()\[\]{}]+)[\)\]\}]$", text)
+    bracket = re.search(r"[\(\[\{](?!\d+.$)([^()\[\]{}]+)[\)\]\}]$", text)
     if bracket and "" in meanings_of(plain(bracket[1]).split() or [""]):
         return text[: bracket.start()].strip(), bracket[1].strip()  # reported if it is needed
     return text, None

@@ -75,6 +75,7 @@ FILES: dict[str, tuple[list[str], str]] = {
     "date and time apart": (["Date,Time,Angle", *lines("{d:%d/%m/%Y},{d:%H:%M:%S.%f},{a:.5f}")], "Time Angle"),
     "s since 1970": (["clock,theta", *[f"{1738928443 + float(x):.2f},{y}" for x, y in (z.split() for z in lines("{t:.2f} {a:.5f}"))]], "clock theta"),
     "ns since 1970": (["time (ns),theta", *[f"{1738928443 * 10**9 + int(x)},{y}" for x, y in (z.split() for z in lines("{us} {a:.5f}"))]], "time [s] theta"),
+    "s and ns apart": (["stamp.sec,stamp.nanosec,position[0]", *[f"{1738928443 + x // 10**9},{x % 10**9},{y}" for x, y in ((int(z[0]), z[1]) for z in map(str.split, lines("{us} {a:.5f}")))]], "stamp.sec position[0]"),
 }  # fmt: skip
 
 
@@ -96,6 +97,23 @@ def test_lost_readings_are_left_out(tmp_path: Path, lost: str) -> None:
     there = np.arange(TIME.size) % 40 != 7
     np.testing.assert_allclose(run.theta, THETA[there], atol=1e-5)
     assert run.trusted.all()
+
+
+@pytest.mark.parametrize(
+    ("above", "rate"),
+    [
+        (["Sampling frequency: 40 Hz", "angle (deg)"], 40),
+        (["zero, sample_rate, length", "0, 40, 5"], 40),
+        (["Abtastintervall;25 ms", "Winkel"], 40),
+        (["Capture Frame Rate\t0.04 kHz", "Total Frames\t300"], 40),
+        (["Sample time: 12:30:05", "drive frequency: 3 Hz", "angle"], 100),
+    ],
+)
+def test_a_rate_above_the_table_is_in_the_command(
+    tmp_path: Path, above: list[str], rate: int
+) -> None:
+    with pytest.raises(pendmap.InputError, match=f"--rate {rate} --angle 1"):
+        read(tmp_path, "\n".join([*above, *lines("{a:.5f}")]) + "\n")
 
 
 @pytest.mark.parametrize(
