@@ -116,7 +116,7 @@ def column_of(cells: list[str], decimal: str) -> Column:
     words = texts[odd]
     size, nines = np.abs(values), np.isin(np.abs(values), _NINES)
     others = np.max(size, where=~nines & np.isfinite(size), initial=0.0)
-    values[nines & (size > 2 * others)] = np.nan
+    values[nines & (size / 2 > others)] = np.nan
     if words.empty:
         return Column("number", values, odd, base)
     middle = words.iloc[words.size // 2]
