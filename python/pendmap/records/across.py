@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.formatting import counted, moment
-from pendmap.records.resolution import step_of
 from pendmap.records.scale import FAR_ZERO, middle_of, swings_of
 from pendmap.signal.robust import normal_scale
 from pendmap.tables.findings import finding_of
@@ -35,7 +34,8 @@ FEWEST_SHARED: Final = 50  # Fewest readings of a duplicate, and of a run withou
 LEAST_SHARE: Final = 0.1  # Least share of the shorter run in a duplicate
 LEAST_LEVELS: Final = 20  # Least span of a duplicate, sensor steps: smaller ones agree by chance
 AGREEING: Final = 0.99  # Least share of readings that agree within half a step; 1 % may be edited
-ROUNDING: Final = 1e-5  # Rounding error of written digits or of a unit, over the range
+ROUNDING: Final = 1e-6  # Rounding error of a conversion between units, over the range
+OFF_STEP: Final = 1e-2  # Tolerance, in steps, for differences that are multiples of a step
 
 
 def checked_together(runs: Sequence[Run]) -> tuple[tuple[Run, ...], tuple[Finding, ...]]:
@@ -153,6 +153,20 @@ def without_duplicates(runs: Sequence[Run]) -> list[Run]:
     return made
 
 
+def _digit(theta: Floats) -> float:
+    """Return the resolution of written or counted readings; 0 if none is found."""
+    apart = np.diff(np.unique(np.round(theta, 12)))
+    if not apart.size:
+        return 0.0
+    step = float(apart.min())
+    # Written digits round the multiples of a count; averaging many steps reduces this error.
+    near = apart[apart < 1.5 * step]
+    step = float(near.mean())
+    multiples = apart / step
+    away = np.abs(multiples - np.round(multiples))
+    return step if float(np.quantile(away, 0.9)) < OFF_STEP * max(multiples.mean(), 1.0) else 0.0
+
+
 def _shared(one: Floats, other: Floats) -> tuple[int, int] | None:
     """Return first and last (exclusive) duplicated reading of ``other``; None without any."""
     from scipy.signal import correlate, correlation_lags
@@ -173,7 +187,7 @@ def _shared(one: Floats, other: Floats) -> tuple[int, int] | None:
     first, last = max(-lag, 0), min(other.size, one.size - lag)
     a, b = a[first + lag : last + lag], b[first:last]
     away = np.abs(b - a - np.median(b - a))
-    step = max(step_of(one), step_of(other))
+    step = max(_digit(one), _digit(other))
     allowed = (0.5 + a.size**-0.5) * step + ROUNDING * float(np.ptp(b))
     alike = np.ptp(b) > LEAST_LEVELS * step and np.mean(away <= allowed) >= AGREEING
     return (first, last) if alike else None
