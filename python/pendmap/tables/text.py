@@ -252,8 +252,8 @@ def _clocks(columns: list[Column], names: list[str]) -> None:
         if match := _FRACTION.fullmatch(f"{head} {part}"):  # sec and nanosec are one clock
             one, two = columns[k : k + 2]
             parts = (1e-6 if match[3][0] in "um" else 1e-9) * two.values
-            since = one.values + one.base - (one.values[0] + one.base) + parts
-            columns[k] = dataclasses.replace(one, values=since, base=0.0)
+            whole = one.values - one.values[0] + parts
+            columns[k] = dataclasses.replace(one, values=whole, base=0.0)
             columns[k + 1] = dataclasses.replace(two, values=0.0 * parts)
     moving = []
     for k, column in enumerate(columns):
