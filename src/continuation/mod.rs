@@ -1,0 +1,16 @@
+//! Branches of periodic orbits along a parameter: where orbits are born, change and end.
+//!
+//! - [`course`]: parameters along one coordinate
+//! - [`period`]: the stroboscopic map with derivatives by state and parameters; `smooth`: its equal steps
+//! - [`phases`]: slips and sticks of a motion
+//! - [`cycle`]: closed orbits as zeros, by Newton's method; their multipliers; symmetry
+//! - [`branch`]: steps along a branch, and why it ends
+//! - [`event`]: folds, doublings, symmetry breakings
+
+pub mod branch;
+pub mod course;
+pub mod cycle;
+pub mod event;
+pub mod period;
+pub mod phases;
+mod smooth;
