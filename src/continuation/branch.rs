@@ -8,7 +8,7 @@
 
 use nalgebra::DVector;
 
-use super::cycle::{Closure, Cycles, Orbit};
+use super::cycle::{Cycles, Orbit};
 use super::event::{self, Event};
 use crate::error::{Error, unless_cancelled};
 use std::sync::atomic::AtomicBool;
@@ -27,10 +27,6 @@ const MOST: f64 = 2.5;
 const CHANGE: [f64; 2] = [0.25, 2.0];
 /// Steps of a branch at most.
 const STEPS: usize = 20_000;
-/// Largest step of a difference that passes 0.
-const NEAR: f64 = 0.5;
-/// A difference below this is none.
-const NONE: f64 = 1e-9;
 /// Fastest motion of an orbit that is followed.
 const FASTEST: f64 = 1e3;
 /// Largest distance of two points of one orbit.
@@ -43,10 +39,10 @@ pub enum End {
     Range,
     /// It joins its own beginning.
     Closed,
-    /// On rest, hanging or inverted, at this coordinate.
-    Rest(f64),
-    /// On an orbit of half its period, or one that is its own mirror image, at this coordinate.
-    Parent(f64),
+    /// On rest, hanging or inverted.
+    Rest,
+    /// On an orbit of half its period, or one that is its own mirror image.
+    Parent,
     /// Friction holds the pendulum for ever from there on.
     Sticks,
     /// The motion becomes too fast.
@@ -64,8 +60,8 @@ impl End {
         match self {
             Self::Range => "end of the range",
             Self::Closed => "joins itself",
-            Self::Rest(_) => "meets rest",
-            Self::Parent(_) => "meets its parent orbit",
+            Self::Rest => "meets rest",
+            Self::Parent => "meets its parent orbit",
             Self::Sticks => "sticks for ever",
             Self::Fast => "velocity out of bounds",
             Self::Crossing => "branches cross",
@@ -99,7 +95,7 @@ enum Step {
     /// Too long by this factor.
     Long(f64),
     /// To where the branch ends.
-    Over(End),
+    Over(End, Option<Box<Orbit>>),
 }
 
 impl Cycles<'_> {
@@ -124,7 +120,12 @@ impl Cycles<'_> {
             }
             match self.step(&here, length, &mut refused) {
                 Step::Long(factor) => length *= factor,
-                Step::Over(end) => return Ok((run, end)),
+                Step::Over(end, last) => {
+                    if let Some(last) = last {
+                        event::between(self, &here, &last, &mut run);
+                    }
+                    return Ok((run, end));
+                }
                 Step::On(next, factor) => {
                     refused = None;
                     let at = self.at(&next.place);
@@ -166,8 +167,8 @@ impl Cycles<'_> {
             *refused = None;
             return Step::Long((0.9 / worst).clamp(CHANGE[0], 0.5));
         }
-        if let Some(end) = self.meeting(here, &next) {
-            return Step::Over(end);
+        if let Some((end, last)) = self.meeting(here, &next) {
+            return Step::Over(end, Some(Box::new(last)));
         }
         if next.stuck && !here.stuck {
             *refused = Some(End::Sticks);
@@ -178,28 +179,9 @@ impl Cycles<'_> {
             return Step::Long(CHANGE[0]);
         }
         if next.place.amax() > FASTEST {
-            return Step::Over(End::Fast);
+            return Step::Over(End::Fast, None);
         }
         Step::On(Box::new(next), (1.0 / worst).clamp(0.5, CHANGE[1]))
-    }
-
-    /// Where the branch meets one with more symmetry between two orbits: the square of the difference falls linearly
-    /// to it.
-    fn meeting(&self, here: &Orbit, next: &Orbit) -> Option<End> {
-        let both = [here, next].map(|orbit| self.differences(&orbit.place));
-        let pairs = both[0].iter().zip(&both[1]);
-        let passes = |(a, b): &(&nalgebra::Vector2<f64>, &nalgebra::Vector2<f64>)| {
-            (a.dot(b) < 0.0 || b.norm() < NONE) && (*a - *b).norm() < NEAR
-        };
-        let (a, b) = pairs.into_iter().find(passes)?;
-        let part = a.norm() / (a.norm() + b.norm());
-        let place = self.interpolated(here, next, part);
-        let at = self.at(&place);
-        let rest = match self.of.closure {
-            Closure::Half => true,
-            _ => self.of.n == 1,
-        };
-        Some(if rest { End::Rest(at) } else { End::Parent(at) })
     }
 
     /// A part of the way between two orbits, by Hermite's cubic.

@@ -17,7 +17,7 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{DMatrix, DVector, Dyn, LU, Matrix2, Vector2};
+use nalgebra::{DMatrix, DVector, Dyn, LU, Matrix2};
 
 use super::course::Course;
 use super::period::{Image, Period};
@@ -211,7 +211,7 @@ impl Cycles<'_> {
     pub fn near(&self, guess: &DVector<f64>, row: &DVector<f64>) -> Option<Orbit> {
         if self.of.closure == Closure::Rest {
             let system = self.system(guess)?;
-            return self.complete(guess.clone(), &system, &self.along(), 0.0);
+            return self.complete(guess.clone(), &system, row, 0.0);
         }
         let mut place = guess.clone();
         let mut before = f64::INFINITY;
@@ -238,6 +238,13 @@ impl Cycles<'_> {
         None
     }
 
+    /// The orbit at a place where it closes, without its direction along a branch.
+    #[must_use]
+    pub fn unfollowed(&self, place: &DVector<f64>) -> Option<Orbit> {
+        let system = self.system(place)?;
+        Some(self.finished(place.clone(), &system, self.along(), 1.0, 0.0))
+    }
+
     fn complete(
         &self,
         place: DVector<f64>,
@@ -255,6 +262,17 @@ impl Cycles<'_> {
             let tangent = factors.solve(&last)?.normalize();
             (tangent, factors.determinant().signum())
         };
+        Some(self.finished(place, system, tangent, orientation, moved))
+    }
+
+    fn finished(
+        &self,
+        place: DVector<f64>,
+        system: &System,
+        tangent: DVector<f64>,
+        orientation: f64,
+        moved: f64,
+    ) -> Orbit {
         let parts: Vec<Matrix2<f64>> = system.images.iter().map(|image| image.by_state).collect();
         let tests = [1.0, -1.0].map(|m| self.weak(&parts, m).lu().determinant());
         let law: Option<f64> = system.images.iter().map(|image| image.product).product();
@@ -270,7 +288,7 @@ impl Cycles<'_> {
         let stuck = system.images.iter().any(|image| image.held[1]);
         let product = law.map_or((own, false), |law| (law, true));
         let norm = system.norm;
-        Some(Orbit { place, tangent, orientation, tests, product, parts, phases, stuck, moved, norm })
+        Orbit { place, tangent, orientation, tests, product, parts, phases, stuck, moved, norm }
     }
 
     /// The matrix whose determinant is `det(M - m)` and whose kernel holds the eigenvector at each point, if `m` is
@@ -332,43 +350,6 @@ impl Cycles<'_> {
         let first = map.images(&points[..whole], 0.5);
         points.extend(first.into_iter().map(|between| image(between.state)));
         points
-    }
-
-    /// Half the difference of the orbit from one with half its period or with more symmetry, which passes 0 where the branch
-    /// meets that: a vector for each way in which that may happen.
-    #[must_use]
-    pub fn differences(&self, place: &DVector<f64>) -> Vec<Vector2<f64>> {
-        let points = self.points(place);
-        let n = self.of.n;
-        let away = |a: State, b: State| {
-            let turn = TAU * ((a[0] - b[0]) / TAU).round();
-            Vector2::new(a[0] - b[0] - turn, a[1] - b[1]) * 0.5
-        };
-        let image = |state: State| [-state[0], -state[1]];
-        let mut all = Vec::new();
-        let at_once = self.symmetry == Some(Symmetry::AtOnce);
-        match self.of.closure {
-            Closure::Rest => {}
-            Closure::Half if at_once => all.push(away(points[0], image(points[0]))),
-            Closure::Half => {}
-            Closure::Whole => {
-                if n.is_multiple_of(2) {
-                    all.push(away(points[0], points[n / 2]));
-                }
-                if at_once && self.of.w == 0 {
-                    let half = if n.is_multiple_of(2) { n / 2 } else { 0 };
-                    if n == 1 || half > 0 {
-                        all.push(away(points[0], image(points[half])));
-                    }
-                }
-                if self.symmetry == Some(Symmetry::HalfPeriod) && !n.is_multiple_of(2) {
-                    let map = Period::<3>::new(self.course, &[self.at(place)]);
-                    let later = map.images(&points[n / 2..=n / 2], 0.5);
-                    all.extend(later.iter().map(|one| away(points[0], image(one.state))));
-                }
-            }
-        }
-        all
     }
 }
 
