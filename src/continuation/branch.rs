@@ -10,6 +10,7 @@ use nalgebra::DVector;
 
 use super::cycle::{Cycles, Orbit};
 use super::event::{self, Event};
+use super::transition;
 use crate::error::{Error, unless_cancelled};
 use std::sync::atomic::AtomicBool;
 
@@ -88,6 +89,14 @@ pub struct Bounds {
     pub high: f64,
 }
 
+impl Bounds {
+    /// Whether a coordinate is between the ends.
+    #[must_use]
+    pub fn holds(self, at: f64) -> bool {
+        self.low < at && at < self.high
+    }
+}
+
 /// The result of a step.
 enum Step {
     /// To an orbit, and the part of the step that the next one may have.
@@ -116,7 +125,15 @@ impl Cycles<'_> {
             unless_cancelled(cancel)?;
             let here = run.orbits[run.orbits.len() - 1].clone();
             if length < SHORTEST {
-                return Ok((run, refused.unwrap_or(End::Lost(here.norm))));
+                if refused == Some(End::Sticks) {
+                    transition::swallowed(&mut run);
+                }
+                let Some(after) = refused.is_none().then(|| self.turned_back(&here)).flatten() else {
+                    return Ok((run, refused.unwrap_or(End::Lost(here.norm))));
+                };
+                transition::crossed(&mut run, &here, after);
+                length = FIRST;
+                continue;
             }
             match self.step(&here, length, &mut refused) {
                 Step::Long(factor) => length *= factor,
@@ -128,9 +145,27 @@ impl Cycles<'_> {
                 }
                 Step::On(next, factor) => {
                     refused = None;
+                    let next = if next.phases == here.phases {
+                        next
+                    } else {
+                        let Some([before, after]) = self.transition(&here, &next) else {
+                            length *= CHANGE[0];
+                            continue;
+                        };
+                        if bounds.holds(self.at(&before.place)) {
+                            event::between(self, &here, &before, &mut run);
+                            if !bounds.holds(self.at(&after.place)) {
+                                return Ok((run, End::Range));
+                            }
+                            transition::crossed(&mut run, &before, after);
+                            length = FIRST;
+                            continue;
+                        }
+                        Box::new(before)
+                    };
                     let at = self.at(&next.place);
                     let goal = if at < bounds.low { bounds.low } else { bounds.high };
-                    if at <= bounds.low || at >= bounds.high {
+                    if !bounds.holds(at) {
                         let Some(last) = self.between(&here, &next, goal) else {
                             length *= CHANGE[0];
                             continue;
@@ -161,8 +196,10 @@ impl Cycles<'_> {
         let turn = here.tangent.dot(&next.tangent).clamp(-1.0, 1.0).acos();
         let [before, after] = [here, &next].map(|one| 0.5 * (one.tests[1] - one.tests[0]));
         let change = (after - before).abs() / (2.0 + before.abs().min(after.abs()));
-        let worst =
-            (turn / TURN).max(change / TRACE).max(next.moved / (MOVED * length));
+        let moved = next.moved / (MOVED * length);
+        // At a change of phases the derivative jumps: the branch is followed up to there first.
+        let smooth = next.phases == here.phases;
+        let worst = if smooth { moved.max(turn / TURN).max(change / TRACE) } else { moved };
         if worst > MOST {
             *refused = None;
             return Step::Long((0.9 / worst).clamp(CHANGE[0], 0.5));
@@ -174,7 +211,7 @@ impl Cycles<'_> {
             *refused = Some(End::Sticks);
             return Step::Long(CHANGE[0]);
         }
-        if next.orientation != here.orientation {
+        if smooth && next.orientation != here.orientation {
             *refused = Some(End::Crossing);
             return Step::Long(CHANGE[0]);
         }

@@ -238,6 +238,11 @@ impl Cycles<'_> {
         None
     }
 
+    /// What the system is at a place where it does not close, with the direction of its kernel.
+    pub(super) fn open(&self, place: &DVector<f64>, row: &DVector<f64>) -> Option<Orbit> {
+        self.complete(place.clone(), &self.system(place)?, row, 0.0)
+    }
+
     /// The orbit at a place where it closes, without its direction along a branch.
     #[must_use]
     pub fn unfollowed(&self, place: &DVector<f64>) -> Option<Orbit> {

@@ -58,6 +58,8 @@ pub struct Event {
     pub rises: f64,
     /// Whether the new orbits live where the old one has lost its stability; none where there are no new ones.
     pub supercritical: Option<bool>,
+    /// Whether the map is smooth there: not where the phases change.
+    pub smooth: bool,
 }
 
 /// A test function.
@@ -115,7 +117,7 @@ pub(super) fn between(cycles: &Cycles<'_>, here: &Orbit, next: &Orbit, run: &mut
     for (_, kind, orbit, rises) in found {
         run.orbits.push(orbit);
         let orbit = run.orbits.len() - 1;
-        run.events.push(Event { kind, orbit, rises, supercritical: None });
+        run.events.push(Event { kind, orbit, rises, supercritical: None, smooth: true });
     }
     run.orbits.push(next.clone());
 }

@@ -153,7 +153,10 @@ impl Family {
         while next < self.branches.len() {
             for number in 0..self.branches[next].run.events.len() {
                 let branch = &self.branches[next];
-                let Event { kind, orbit, rises, .. } = branch.run.events[number];
+                let Event { kind, orbit, rises, smooth, .. } = branch.run.events[number];
+                if !smooth {
+                    continue;
+                }
                 let cycles = self.cycles(branch.of);
                 let orbit = &branch.run.orbits[orbit];
                 let Some(of) = cycles.shed_type(kind) else { continue };
