@@ -259,7 +259,7 @@ impl Cycles<'_> {
     ) -> Option<Orbit> {
         let count = system.gap.len();
         let (tangent, orientation) = if self.of.closure == Closure::Rest {
-            (row.clone(), 1.0)
+            (row.clone(), row[count].signum())
         } else {
             let factors = bordered(&system.matrix, row);
             let mut last = DVector::zeros(count + 1);

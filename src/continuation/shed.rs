@@ -10,7 +10,10 @@ use crate::integrate::State;
 use crate::model::pendulum::Symmetry;
 
 /// Distances along the eigenvector at which the new branch is begun, the first that succeeds.
-const DISTANCES: [f64; 4] = [1e-2, 3e-3, 1e-3, 3e-4];
+const DISTANCES: [f64; 5] = [1e-2, 3e-3, 1e-3, 3e-4, 1e-4];
+/// Largest distance of the new orbit from the old one in those distances, and largest change of its multipliers.
+const STRAYED: f64 = 3.0;
+const TURNED: f64 = 0.5;
 
 /// The first orbits of a new branch.
 #[derive(Clone, Debug)]
@@ -58,8 +61,10 @@ impl Cycles<'_> {
             let side = |orbit: &Orbit, by: f64| (new.at(&orbit.place) - at) / (by * by);
             // Without the next term of the series.
             let side = (4.0 * side(&half, 0.5 * distance) - side(&far, *distance)) / 3.0;
-            let apart = |orbit: &Orbit, by: f64| (&orbit.place - &place).norm() < 3.0 * by;
-            apart(&far, *distance).then_some((far, side))
+            let near = (&far.place - &place).norm() < STRAYED * distance;
+            // Nothing has happened on the new branch yet.
+            let alike = (far.tests[1] - old.tests[1]).abs() < TURNED;
+            (near && alike).then_some((far, side))
         });
         let (far, side) = first?;
         Some(Shed { of, orbits: [Orbit { tangent: row, ..old }, far], side })
