@@ -44,15 +44,16 @@ impl Cycles<'_> {
         }
     }
 
-    /// What the orbit sheds at an event of this kind; none where no new orbit is found.
+    /// What the orbit sheds at an event of this kind, to one side of it or, in the sense -1, to the other; none where no
+    /// new orbit is found.
     #[must_use]
-    pub fn shed(&self, orbit: &Orbit, kind: Kind) -> Option<Shed> {
+    pub fn shed(&self, orbit: &Orbit, kind: Kind, sense: f64) -> Option<Shed> {
         let of = self.shed_type(kind)?;
         let new = Cycles { of, ..*self };
         let at = self.at(&orbit.place);
         let place = new.place(&self.repeated(orbit, &new), at);
         let old = new.unfollowed(&place)?;
-        let direction = new.eigenvector(&old, 1.0)?;
+        let direction = new.eigenvector(&old, 1.0)? * sense;
         let count = direction.len();
         let row = direction.insert_row(count, 0.0);
         let first = DISTANCES.iter().find_map(|distance| {

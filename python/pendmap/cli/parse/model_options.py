@@ -66,9 +66,9 @@ def varied_model_options(function: Command, *, ends: bool = False) -> Command:
     vary = option(
         "--vary",
         (str, ENDS if ends else RANGE),
-        f"A parameter that varies, {'' if ends else 'N values '}from A to B: p, omega, ..., EFFECT.PARAMETER; of a"
-        " model in SI also Omega, c_over_m, Tr, phi, stroke_mm, and frequency_hz, where the stroke"
-        " is constant if the model gives it, else p.",
+        f"A parameter that varies, {'' if ends else 'N values '}from A to B: p, omega, ...,"
+        " EFFECT.PARAMETER; of a model in SI also Omega, c_over_m, Tr, phi, stroke_mm, and"
+        " frequency_hz, where the stroke is constant if the model gives it, else p.",
         nargs=2,
         multiple=True,
         metavar="NAME A:B" if ends else "NAME A:B:N",
