@@ -181,7 +181,7 @@ impl Family {
                     side = Some(shed.side);
                     if self.end_at(of, &place.0, place.1).is_none() && of.n <= self.longest {
                         let cycles = self.cycles(of);
-                        new.push(cycles.from_parent(&shed.orbits, self.bounds, cancel)?);
+                        new.push(cycles.begun_at(&shed.orbits, self.bounds, cancel)?);
                     }
                 }
                 while let Some((branch, end)) = self.end_at(of, &place.0, place.1) {
@@ -273,20 +273,18 @@ impl Cycles<'_> {
         bounds: Bounds,
         cancel: &AtomicBool,
     ) -> Result<Branch, Error> {
-        let none = (None, [None; 2]);
-        let (ahead, end) = self.followed(first.clone(), bounds, cancel)?;
+        let branch = |run, ends| Branch { of: self.of, run, ends, meets: [None; 2], twin: None };
+        let (ahead, end) = self.followed(&first, bounds, cancel)?;
         if end == End::Closed {
-            let ends = [End::Closed; 2];
-            return Ok(Branch { of: self.of, run: ahead, ends, meets: none.1, twin: none.0 });
+            return Ok(branch(ahead, [End::Closed; 2]));
         }
-        let turned = Orbit { tangent: -&first.tangent, orientation: -first.orientation, ..first };
-        let (back, begin) = self.followed(turned, bounds, cancel)?;
-        let run = back.reversed().joined(ahead);
-        Ok(Branch { of: self.of, run, ends: [begin, end], meets: none.1, twin: none.0 })
+        let turned = Orbit { tangent: -&first.tangent, orientation: !first.orientation, ..first };
+        let (back, begin) = self.followed(&turned, bounds, cancel)?;
+        Ok(branch(back.reversed().joined(ahead), [begin, end]))
     }
 
     /// The branch that begins at an orbit shed by another one.
-    fn from_parent(
+    fn begun_at(
         &self,
         [old, first]: &[Orbit; 2],
         bounds: Bounds,
@@ -296,7 +294,7 @@ impl Cycles<'_> {
         let (mut run, end) = if beyond {
             (Run { orbits: vec![first.clone()], events: Vec::new() }, End::Range)
         } else {
-            self.followed(first.clone(), bounds, cancel)?
+            self.followed(first, bounds, cancel)?
         };
         run.orbits.insert(0, old.clone());
         for event in &mut run.events {
@@ -316,7 +314,7 @@ impl Run {
         let last = self.orbits.len() - 1;
         for orbit in &mut self.orbits {
             orbit.tangent.neg_mut();
-            orbit.orientation = -orbit.orientation;
+            orbit.orientation = !orbit.orientation;
         }
         for event in &mut self.events {
             event.orbit = last - event.orbit;

@@ -7,7 +7,7 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::Vector2;
 
-use super::branch::End;
+use super::branch::{End, interpolated};
 use super::cycle::{Closure, Cycles, Orbit, Type};
 use super::period::Period;
 use crate::integrate::State;
@@ -80,7 +80,7 @@ impl Cycles<'_> {
         };
         let (a, b) = both[0].iter().zip(&both[1]).find(passes)?;
         let part = a.2.norm() / (a.2.norm() + b.2.norm());
-        let between = self.interpolated(here, next, part);
+        let between = interpolated(here, next, part);
         let place = self.met((a.0, a.1), &between).unwrap_or(between);
         let last = self.unfollowed(&place)?;
         let end = if a.0.closure == Closure::Rest { End::Rest } else { End::Parent };

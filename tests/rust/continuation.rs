@@ -239,6 +239,21 @@ fn a_torque_opens_the_pitchfork_and_no_step_jumps_across() {
 }
 
 #[test]
+fn rotations_along_a_torque_close_on_themselves() {
+    let found =
+        along(Course::of(&driven(0.1, 0.6, 2.0), Parameter::Torque), [-1.5, 2.0], (1, 1), 1);
+    let branch = &found.family.branches[0];
+    assert_eq!(found.family.branches.len(), 1);
+    assert_eq!(branch.ends, [End::Closed; 2]);
+    let folds = events(&found, 1, Happens::Fold);
+    assert_eq!(folds.len(), 2, "locked between two torques: {folds:?}");
+    // No orbit turns with the drive beyond them.
+    for at in [folds[0] - 1e-3, folds[1] + 1e-3] {
+        assert!(branch.at(&found.family.cycles(branch.of), at).is_empty());
+    }
+}
+
+#[test]
 fn a_direct_drive_has_symmetric_orbits_of_odd_period() {
     let spec = formula("push", "k*cos(phase)", &[("k", 2.0)]);
     let push = Effect::new(Kind::Formula(Formula::new(&spec).expect("a formula")), &[0.2])
@@ -264,11 +279,11 @@ fn a_direct_drive_has_symmetric_orbits_of_odd_period() {
 
 #[test]
 fn negative_damping_sheds_a_torus() {
-    let spec = formula("pump", "a*v - 0.5*v^3", &[("a", 1.0)]);
+    let spec = formula("pump", "b*v - 0.5*v^3", &[("b", 1.0)]);
     let pump = Effect::new(Kind::Formula(Formula::new(&spec).expect("a formula")), &[0.1])
         .expect("in range");
     let base = driven(0.2, 0.05, 1.3).with_effect(pump).expect("once");
-    let course = Course::of(&base, base.parameter("pump.a").expect("there"));
+    let course = Course::of(&base, base.parameter("pump.b").expect("there"));
     let found = along(course, [0.1, 0.3], (1, 0), 1);
     let all: Vec<f64> = events(&found, 1, Happens::NeimarkSacker);
     // Rest, hanging: the damping is none where the effect feeds what gamma takes.

@@ -200,13 +200,13 @@ def _start(
     if np.asarray(start, dtype=object).shape != (2,):
         raise InputError(f"start must be (angle, velocity), got {short_repr(start)}")
     angle, speed = (check_number("start", part) for part in start)
-    own = model.attributes.get(axis.name)
+    value = model.attributes.get(axis.name)
     low, high = axis.values[[0, -1]]
-    if not isinstance(own, float) or not low <= own <= high:
+    if not isinstance(value, float) or not low <= value <= high:
         raise InputError(
-            f"{axis.name} of the model must be in the range where a start is given, got {own}"
+            f"{axis.name} of the model must be in the range where a start is given, got {value}"
         )
-    return angle, float(units.bare(speed, VELOCITY)), own
+    return angle, float(units.bare(speed, VELOCITY)), value
 
 
 def _dataset(raw: _core.Continuation, axis: Varied, units: Units) -> xr.Dataset:
