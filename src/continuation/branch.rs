@@ -127,10 +127,10 @@ impl Cycles<'_> {
             unless_cancelled(cancel)?;
             let here = run.orbits[run.orbits.len() - 1].clone();
             if length < SHORTEST {
-                match self.stopped(&here, refused, &mut run) {
-                    Some(end) => return Ok((run, end)),
-                    None => (length, refused) = (FIRST, None),
+                if let Some(end) = self.stopped(&here, refused, &mut run) {
+                    return Ok((run, end));
                 }
+                (length, refused) = (FIRST, None);
                 continue;
             }
             match self.step(&here, length, &mut refused) {
@@ -143,7 +143,7 @@ impl Cycles<'_> {
                 }
                 Step::On(next, factor) => {
                     refused = None;
-                    let next = if next.phases == here.phases {
+                    let next = if next.is_like(&here) {
                         next
                     } else {
                         let Some([before, after]) = self.transition(&here, &next) else {
@@ -192,8 +192,14 @@ impl Cycles<'_> {
                 run.orbits.push(after);
             }
             None => {
-                let Some(after) = self.turned_back(here) else { return Some(End::Lost(here.norm)) };
-                transition::crossed(run, here, after);
+                if let Some(after) = self.turned_back(here) {
+                    transition::crossed(run, here, after);
+                    return None;
+                }
+                let Some(last) = self.swallowed(here) else { return Some(End::Lost(here.norm)) };
+                run.orbits.push(last);
+                transition::swallowed(run);
+                return Some(End::Sticks);
             }
             _ => {
                 transition::swallowed(run);
@@ -215,7 +221,7 @@ impl Cycles<'_> {
         let change = (after - before).abs() / (2.0 + before.abs().min(after.abs()));
         let moved = next.moved / (MOVED * length);
         // At a change of phases the derivative jumps: the branch is followed up to there first.
-        let smooth = next.phases == here.phases;
+        let smooth = next.is_like(here);
         let worst = if smooth { moved.max(turn / TURN).max(change / TRACE) } else { moved };
         if worst > MOST {
             *refused = None;

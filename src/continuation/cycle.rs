@@ -97,12 +97,22 @@ pub struct Orbit {
     pub parts: Vec<Matrix2<f64>>,
     /// Phases under friction, see [`round`].
     pub phases: Vec<Phase>,
+    /// The phase at each of its points: where it changes, so does the derivative by the points.
+    pub section: Vec<Phase>,
     /// Whether friction holds it for ever.
     pub stuck: bool,
     /// Distance from where Newton's method began.
     pub moved: f64,
     /// Largest norm of a derivative.
     pub norm: f64,
+}
+
+impl Orbit {
+    /// Whether the map is smooth from this orbit to the other: slips and sticks are the same.
+    #[must_use]
+    pub fn is_like(&self, other: &Self) -> bool {
+        self.phases == other.phases && self.section == other.section
+    }
 }
 
 /// The system at one place.
@@ -304,10 +314,24 @@ impl Cycles<'_> {
             }
             _ => round(phases),
         };
+        let section =
+            system.images.iter().filter_map(|image| image.phases.first().copied()).collect();
         let stuck = system.images.iter().any(|image| image.held[1]);
         let product = law.map_or((own, false), |law| (law, true));
         let norm = system.norm;
-        Orbit { place, tangent, orientation, tests, product, parts, phases, stuck, moved, norm }
+        Orbit {
+            place,
+            tangent,
+            orientation,
+            tests,
+            product,
+            parts,
+            phases,
+            section,
+            stuck,
+            moved,
+            norm,
+        }
     }
 
     /// The matrix whose determinant is `det(M - m)` and whose kernel holds the eigenvector at each point, if `m` is

@@ -122,7 +122,7 @@ pub(super) fn between(cycles: &Cycles<'_>, here: &Orbit, next: &Orbit, run: &mut
 fn touched(cycles: &Cycles<'_>, run: &Run, next: &Orbit) -> Option<(bool, Orbit)> {
     let count = run.orbits.len();
     let [before, here] = [run.orbits.get(count.checked_sub(2)?)?, run.orbits.last()?];
-    let smooth = before.phases == here.phases && here.phases == next.phases;
+    let smooth = before.is_like(here) && here.is_like(next);
     let event = run.events.last().is_some_and(|event| event.orbit + 2 >= count);
     if !smooth || event || before.orientation != next.orientation {
         return None;
@@ -190,7 +190,8 @@ fn zero(cycles: &Cycles<'_>, a: &Orbit, b: &Orbit, test: Test) -> Option<Orbit> 
         }
         let part = (low * at_high - high * at_low) / (at_high - at_low);
         let part = if part > low && part < high { part } else { 0.5 * (low + high) };
-        let orbit = cycles.near(&interpolated(a, b, part), &a.tangent)?;
+        let at = |part: f64| Some((part, cycles.near(&interpolated(a, b, part), &a.tangent)?));
+        let (part, orbit) = at(part).or_else(|| at(0.5 * (low + high)))?;
         let value = test(cycles, &orbit);
         let side = usize::from(value.signum() != at_low.signum());
         let known = (part - ends[side].0).abs() < EXACT;

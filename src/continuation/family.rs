@@ -174,6 +174,8 @@ impl Family {
                 let both =
                     kind == Kind::SymmetryBreaking && self.symmetry != Some(Symmetry::AtOnce);
                 let senses: &[f64] = if both { &[1.0, -1.0] } else { &[1.0] };
+                let rest = branch.of.closure == Closure::Rest;
+                let begin = if rest { End::Rest } else { End::Parent };
                 let mut side = None;
                 let mut new = Vec::new();
                 for sense in senses {
@@ -181,7 +183,7 @@ impl Family {
                     side = Some(shed.side);
                     if self.end_at(of, &place.0, place.1).is_none() && of.n <= self.longest {
                         let cycles = self.cycles(of);
-                        new.push(cycles.begun_at(&shed.orbits, self.bounds, cancel)?);
+                        new.push(cycles.begun_at(&shed.orbits, begin, self.bounds, cancel)?);
                     }
                 }
                 while let Some((branch, end)) = self.end_at(of, &place.0, place.1) {
@@ -287,6 +289,7 @@ impl Cycles<'_> {
     fn begun_at(
         &self,
         [old, first]: &[Orbit; 2],
+        begin: End,
         bounds: Bounds,
         cancel: &AtomicBool,
     ) -> Result<Branch, Error> {
@@ -300,8 +303,6 @@ impl Cycles<'_> {
         for event in &mut run.events {
             event.orbit += 1;
         }
-        let rest = self.of.closure == Closure::Half || self.of.n == 1;
-        let begin = if rest { End::Rest } else { End::Parent };
         Ok(Branch { of: self.of, run, ends: [begin, end], meets: [None; 2], twin: None })
     }
 }

@@ -27,7 +27,7 @@ def test_a_fold_and_a_doubling_are_where_scipy_has_them() -> None:
         """Return 1 + tr + det of the orbit's derivative."""
         pendulum = Pendulum(gamma=0.1, p=p, omega=2.0)
         turn = (2 * math.pi, 0.0)
-        point = fsolve(lambda x: np.subtract(poincare(pendulum, x)[0], x) - turn, start, xtol=1e-13)
+        point = fsolve(lambda x: np.subtract(poincare(pendulum, x)[0], x) - turn, start, xtol=1e-10)
         _, derivative = poincare(pendulum, point)
         return float(1 + np.trace(derivative) + np.linalg.det(derivative))
 
