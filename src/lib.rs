@@ -44,6 +44,7 @@
 //! ```
 
 pub mod attractor;
+pub mod continuation;
 pub mod error;
 pub mod fit;
 pub mod integrate;
