@@ -35,7 +35,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     a, name = facts(dataset), str(dataset.attrs["varied"])
     units = Units.of(a)
     theta = plane.angles(dataset, dataset["point_theta"].values)
-    sides = names.phase_plane(theta, holding(dataset["point_velocity"].values, 0.0), units)
+    sides = names.phase_plane(theta, holding(dataset["point_velocity"].values), units)
     label = names.symbol(name, str(dataset["orbit_value"].attrs.get("units", "1")))
     below = Axis(label, (float(a["low"]), float(a["high"])))
     panels = [
