@@ -10,6 +10,7 @@
 //! - [`family`]: branches, and what they shed
 
 pub mod branch;
+mod closure;
 pub mod course;
 pub mod cycle;
 pub mod event;
