@@ -20,14 +20,7 @@ from pendmap.errors import InputError, short_repr
 from pendmap.formatting import counted, listed
 from pendmap.tables.cells import column_of, counted_since, split, unwrapped, weight
 from pendmap.tables.findings import finding_of
-from pendmap.tables.units import (
-    CHANNELS,
-    TIMES,
-    Heading,
-    name_and_unit,
-    spelling,
-    stated_rate,
-)
+from pendmap.tables.units import CHANNELS, TIMES, Heading, name_and_unit, spelling, stated_rate
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
