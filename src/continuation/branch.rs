@@ -30,7 +30,7 @@ const CHANGE: [f64; 2] = [0.25, 2.0];
 /// Steps over a place where branches cross.
 const ACROSS: [f64; 3] = [1e-4, 1e-3, 1e-2];
 /// A multiplier this near to 1 is 1.
-const FADES: f64 = 1e-9;
+const FADES: f64 = 1e-6;
 /// Steps of a branch at most.
 const STEPS: usize = 20_000;
 /// Fastest motion of an orbit that is followed.
