@@ -23,9 +23,7 @@ _MARKERS: Final = {
     "period_doubling": "o",
     "symmetry_breaking": "^",
     "neimark_sacker": "D",
-    "stick_onset": "v",
-    "grazing": "v",
-    "rest_boundary": "v",
+    **dict.fromkeys(("stick_onset", "grazing", "rest_boundary"), "v"),
 }
 
 
@@ -43,8 +41,8 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
         for which, side in zip(("theta", "velocity"), sides, strict=True)
     ]
     title = f"Branches of orbits {a['n']}:{a['w']} over {names.over([name])}"
-    subtitle = names.parameters(a, [name])
-    return Chart(title, subtitle, [[panel] for panel in panels], size=(7.4, 6.8)).only(layer)
+    chosen = names.parameters(a, [name])
+    return Chart(title, chosen, [[panel] for panel in panels], size=(7.4, 6.8)).only(layer)
 
 
 def _marks(dataset: xr.Dataset, which: str) -> list[Mark]:
