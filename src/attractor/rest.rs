@@ -112,7 +112,8 @@ fn centre(equation: &Equation<f64>, middle: f64) -> f64 {
 }
 
 /// The angle within `width` of `theta` at which the excess of the load is least, by ternary search.
-fn least_loaded(equation: &Equation<f64>, theta: f64, width: f64) -> f64 {
+#[must_use]
+pub fn least_loaded(equation: &Equation<f64>, theta: f64, width: f64) -> f64 {
     let (mut low, mut high) = (theta - width, theta + width);
     for _ in 0..60 {
         let [a, b] = [low + (high - low) / 3.0, high - (high - low) / 3.0];

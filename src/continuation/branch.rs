@@ -10,7 +10,6 @@ use nalgebra::DVector;
 
 use super::cycle::{Cycles, Orbit};
 use super::event::{self, Event};
-use super::phases::Phase;
 use super::transition;
 use crate::error::{Error, unless_cancelled};
 use std::sync::atomic::AtomicBool;
@@ -29,8 +28,6 @@ const MOST: f64 = 2.5;
 const CHANGE: [f64; 2] = [0.25, 2.0];
 /// Steps over a place where branches cross.
 const ACROSS: [f64; 3] = [1e-4, 1e-3, 1e-2];
-/// A multiplier this near to 1 is 1.
-const FADES: f64 = 1e-6;
 /// Steps of a branch at most.
 const STEPS: usize = 20_000;
 /// Fastest motion of an orbit that is followed.
@@ -199,18 +196,18 @@ impl Cycles<'_> {
                     transition::crossed(run, here, after);
                     return None;
                 }
-                let Some(last) = self.swallowed(here) else { return Some(End::Lost(here.norm)) };
-                run.orbits.push(last);
-                transition::swallowed(run);
-                return Some(End::Sticks);
+                return Some(self.faded(here, run).unwrap_or(End::Lost(here.norm)));
             }
-            _ => {
-                run.orbits.extend(self.swallowed(here));
-                transition::swallowed(run);
-                return refused;
-            }
+            _ => return self.faded(here, run).or(refused),
         }
         None
+    }
+
+    /// Ends the run where friction comes to hold the pendulum for ever, if that is beside an orbit.
+    fn faded(&self, here: &Orbit, run: &mut Run) -> Option<End> {
+        run.orbits.push(self.swallowed(here)?);
+        transition::swallowed(run);
+        Some(End::Sticks)
     }
 
     /// One step; `refused` keeps why the last one was.
@@ -234,9 +231,7 @@ impl Cycles<'_> {
         if let Some((end, last)) = self.meeting(here, &next) {
             return Step::Over(end, Some(Box::new(last)));
         }
-        // Where a motion between sticks fades, its neighbours stay too, and a multiplier is 1.
-        let fades = next.phases.contains(&Phase::Stick) && next.tests[0].abs() < FADES;
-        if (next.stuck && !here.stuck) || fades {
+        if next.stuck || self.fades(&next) {
             *refused = Some(End::Sticks);
             return Step::Long(CHANGE[0]);
         }

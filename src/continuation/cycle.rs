@@ -76,7 +76,7 @@ pub struct Orbit {
     pub phases: Vec<Phase>,
     /// The phase at each of its points: where it changes, so does the derivative by the points.
     pub section: Vec<Phase>,
-    /// Whether friction holds it for ever.
+    /// Whether friction holds it for ever, or will: without a turn, slips of one sense alone do not close, they fade.
     pub stuck: bool,
     /// Distance from where Newton's method began.
     pub moved: f64,
@@ -293,7 +293,9 @@ impl Cycles<'_> {
         };
         let section =
             system.images.iter().filter_map(|image| image.phases.first().copied()).collect();
-        let stuck = system.images.iter().any(|image| image.held[1]);
+        let held = system.images.iter().any(|image| image.held[1]);
+        let both = [Phase::Forward, Phase::Backward].iter().all(|sense| phases.contains(sense));
+        let stuck = held || self.of.w == 0 && !phases.is_empty() && !both;
         let product = law.map_or((own, false), |law| (law, true));
         let norm = system.norm;
         Orbit {

@@ -112,9 +112,9 @@ impl Family {
     ) -> Result<bool, Error> {
         let Some((of, points)) = self.type_of(orbit, at) else { return Ok(false) };
         let cycles = self.cycles(of);
-        let Some(first) = cycles.near(&cycles.place(&points, at), &cycles.along()) else {
-            return Ok(false);
-        };
+        let first = cycles.near(&cycles.place(&points, at), &cycles.along());
+        // Where friction holds the pendulum for ever, orbits are not isolated.
+        let Some(first) = first.filter(|orbit| !orbit.stuck) else { return Ok(false) };
         let branch = cycles.both_ways(first, self.bounds, cancel)?;
         let from = self.branches.len();
         self.branches.push(branch);

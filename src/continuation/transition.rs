@@ -9,13 +9,19 @@ use super::branch::Run;
 use super::cycle::{Cycles, Orbit};
 use super::event::{Event, Kind};
 use super::phases::Phase;
+use crate::attractor::rest::least_loaded;
+use crate::integrate::State;
 
 /// Halvings at most, the distance of the orbits at which they end, and the largest at which they are neighbours.
 const HALVINGS: usize = 60;
 const EXACT: f64 = 1e-13;
 const NEIGHBOURS: f64 = 1e-9;
-/// Distances beyond an orbit at which another sequence is looked for.
-const BEYOND: [f64; 5] = [1e-9, 1e-8, 1e-7, 1e-6, 1e-5];
+/// Distances beyond an orbit at which another sequence, or rest, is looked for.
+const BEYOND: [f64; 6] = [1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4];
+/// Largest motion of an orbit whose slips fade.
+const FADED: f64 = 1e-3;
+/// An excess of the load below this moves the pendulum by its square, no more than rounding.
+const FAINT: f64 = 1e-7;
 /// Largest distance of the orbit found there from its prediction, in those distances.
 const MOVED: f64 = 3.0;
 
@@ -40,18 +46,44 @@ impl Cycles<'_> {
         neighbours.then_some([before, after])
     }
 
-    /// The last orbit before friction holds the pendulum for ever, straight on from one so near that no step is possible: the
-    /// motion between its sticks fades there.
+    /// The orbit at which friction comes to hold the pendulum for ever, ahead of one beside it: the slips between its sticks
+    /// have faded, and the least load of all angles, at its greatest in a period, equals the friction.
     pub(super) fn swallowed(&self, here: &Orbit) -> Option<Orbit> {
-        let ahead = |away: f64| self.open(&(&here.place + &here.tangent * away), &here.tangent);
-        let held = |away: f64| ahead(away).is_some_and(|orbit| orbit.stuck);
-        let mut beyond = BEYOND.into_iter().find(|away| held(*away))?;
-        let mut before = 0.0;
+        let last = here.place.len() - 1;
+        let (mut before, sense) = (here.place[last], here.tangent[last].signum());
+        self.least_excess(here, before)?;
+        let holds = |along: f64| self.least_excess(here, along).is_some_and(|(_, x)| x <= 0.0);
+        let away = BEYOND.into_iter().find(|away| holds(before + sense * away))?;
+        let mut beyond = before + sense * away;
         for _ in 0..HALVINGS {
             let middle = 0.5 * (before + beyond);
-            if held(middle) { beyond = middle } else { before = middle }
+            if holds(middle) { beyond = middle } else { before = middle }
         }
-        ahead(before)
+        let (theta, _) = self.least_excess(here, beyond)?;
+        let points = vec![[theta, 0.0]; self.count()];
+        let orbit = self.unfollowed(&self.place(&points, self.origin + beyond * self.scale))?;
+        Some(Orbit { tangent: here.tangent.clone(), orientation: here.orientation, ..orbit })
+    }
+
+    /// Whether slips between sticks are ones of rounding.
+    pub(super) fn fades(&self, orbit: &Orbit) -> bool {
+        let along = orbit.place[orbit.place.len() - 1];
+        orbit.phases.contains(&Phase::Stick)
+            && self.least_excess(orbit, along).is_some_and(|(_, excess)| excess < FAINT)
+    }
+
+    /// The angle beside an orbit that rests at the section, and the excess of the load over the friction there at its
+    /// greatest, where that is least.
+    fn least_excess(&self, orbit: &Orbit, along: f64) -> Option<(f64, f64)> {
+        let points = self.points(&orbit.place);
+        let theta = points[0][0];
+        let still = |point: &State| (point[0] - theta).abs().max(point[1].abs()) < FADED;
+        if !points.iter().all(still) {
+            return None;
+        }
+        let equation = self.course.pendulum(&[self.origin + along * self.scale]).equation();
+        let least = least_loaded(&equation, theta, FADED);
+        Some((least, equation.excess(least)))
     }
 
     /// The first orbit with other phases where no orbit lies ahead of the last one: the branch turns back.

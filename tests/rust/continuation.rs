@@ -181,6 +181,22 @@ fn rest_swallows_a_stick_slip_motion() {
 }
 
 #[test]
+fn a_motion_between_sticks_ends_where_one_angle_is_held() {
+    // The load torque - (1 + p cos) sin th stays within the friction at one angle: (1 + p) s = .25 and (1 - p) s = .05.
+    for omega in [1.2, 2.0] {
+        let base = Pendulum::new(0.1, 1.0, omega, 0.0, 0.15).expect("in range");
+        let base = base.with_friction(0.1).expect("in range");
+        let found = along_p(&base, [0.05, 1.6], (1, 0), 1);
+        assert_near(&events(&found, 1, Happens::RestBoundary), &[2.0 / 3.0; 2], 1e-12);
+        let below = |branch: &Branch| {
+            let cycles = found.family.cycles(branch.of);
+            branch.run.orbits.iter().any(|orbit| cycles.at(&orbit.place) < 0.666)
+        };
+        assert!(!found.family.branches.iter().any(below), "no orbit moves between held angles");
+    }
+}
+
+#[test]
 fn doublings_accumulate_by_feigenbaums_ratio() {
     let found = along_p(&driven(0.1, 1.0, 2.0), [1.3, 1.85], (1, 1), 32);
     let at: Vec<f64> = [1, 2, 4, 8, 16, 32]
