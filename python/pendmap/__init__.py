@@ -13,6 +13,7 @@ TYPE_CHECKING = False  # importing typing would take most of this file's import 
 if TYPE_CHECKING:
     from typing import Any
 
+    from pendmap.analysis.backbone import backbone as backbone
     from pendmap.analysis.basin_sweep import sweep as sweep
     from pendmap.analysis.basins import basins as basins
     from pendmap.analysis.basins import basins_of as basins_of
@@ -72,6 +73,7 @@ ANALYSES = {
     "parameter_map": ("map", ["parameter_map"], "Map which attractors exist over two parameters."),
     "bifurcation": ("bifurcation", ["bifurcation"], "Draw stroboscopic points along a parameter."),
     "continuation": ("continue", ["continuation"], "Follow periodic orbits along a parameter."),
+    "backbone": ("backbone", ["backbone"], "List motions without losses, by energy."),
     "orbits": ("orbit", ["orbit"], "Find all periodic orbits of one period and winding."),
     "lyapunov": ("lyapunov", ["lyapunov"], "Find the largest Lyapunov exponent of an attractor."),
     "lifetime": ("lifetime", ["lifetime"], "Measure how long transient chaos lives."),

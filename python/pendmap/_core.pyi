@@ -134,6 +134,8 @@ class Continuation:
     value: _Floats
     multipliers: _Floats
     phases: list[str]
+    amplitude: _Floats
+    swings: NDArray[np.int32]
     point_orbit: _Places
     theta: _Floats
     velocity: _Floats

@@ -6,6 +6,7 @@
 //! - [`cycle`]: closed orbits as zeros, by Newton's method; their multipliers; symmetry
 //! - [`branch`]: steps along a branch, and why it ends; `meeting`: on another one
 //! - [`event`]: folds, doublings, symmetry breakings; [`shed`]: the branches that begin there
+//! - `swing`: amplitudes
 //! - `transition`: where slips and sticks change
 //! - [`family`]: branches, and what they shed
 
@@ -20,4 +21,5 @@ pub mod period;
 pub mod phases;
 pub mod shed;
 mod smooth;
+mod swing;
 mod transition;

@@ -31,6 +31,9 @@ pub struct Continuation {
     value: Array<f64>,
     multipliers: Py<PyArray2<f64>>,
     phases: Vec<String>,
+    /// Its amplitude, not a number for a rotation, and how often it swings to and fro.
+    amplitude: Array<f64>,
+    swings: Array<i32>,
     /// Of each point: its orbit, angle and velocity.
     point_orbit: Array<i32>,
     theta: Array<f64>,
@@ -94,6 +97,7 @@ impl Continuation {
             of.map_or(-1, |(branch, event)| (events[branch] + event) as i32)
         };
         let (mut owner, mut value, mut multipliers, mut phases) = (vec![], vec![], vec![], vec![]);
+        let (mut amplitude, mut swings) = (vec![], vec![]);
         let (mut point_orbit, mut theta, mut velocity) = (vec![], vec![], vec![]);
         for (number, branch) in all.iter().enumerate() {
             let cycles = family.cycles(branch.of);
@@ -106,6 +110,9 @@ impl Continuation {
                     theta.push(angle.wrapped(point[0]));
                     velocity.push(point[1]);
                 }
+                let (reach, count) = cycles.swing(orbit).unwrap_or((f64::NAN, 0));
+                amplitude.push(reach);
+                swings.push(count as i32);
                 owner.push(number as i32);
                 value.push(cycles.at(&orbit.place));
             };
@@ -128,6 +135,8 @@ impl Continuation {
             value: array(py, value),
             multipliers: PyArray2::from_vec2(py, &multipliers)?.unbind(),
             phases,
+            amplitude: array(py, amplitude),
+            swings: array(py, swings),
             point_orbit: array(py, point_orbit),
             theta: array(py, theta),
             velocity: array(py, velocity),

@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from pendmap import _core
-from pendmap.analysis import result, varied
+from pendmap.analysis import backbone, result, varied
 from pendmap.analysis.result import Field, Schema, point, rows
 from pendmap.analysis.run import Numerics, RunOptions
 from pendmap.errors import (
@@ -135,7 +135,10 @@ def continuation(  # noqa: PLR0913 (physics first, numerical choices by name)
         ``branch_low`` and ``branch_high``, ``branch_begin_event`` and ``branch_end_event`` (the
         event that it meets another branch at), ``branch_twin``. Their orbits over ``orbit``:
         ``orbit_value``, ``orbit_branch``, ``orbit_multipliers``, ``orbit_stable``,
-        ``orbit_phases`` (under friction: + - slips, 0 sticks); all points over ``point``. Events
+        ``orbit_phases`` (under friction: + - slips, 0 sticks), ``orbit_amplitude`` (half the angle
+        between its outermost turns; nan of rotations), ``orbit_swings``; all points over ``point``.
+        Along a frequency, the ``backbone_amplitude`` of free swings over ``backbone_value``, their
+        rate: orbits of ``k`` swings in ``n`` periods lie near ``n/k`` times it. Events
         over ``event``: ``event_kind``, ``event_value``, ``event_theta``, ``event_velocity``,
         ``event_n``, ``event_w``, ``event_multipliers``, ``event_supercritical``, ``event_smooth``,
         ``event_branch``, ``event_orbit``. Sections searched over ``section``.
@@ -175,6 +178,8 @@ def continuation(  # noqa: PLR0913 (physics first, numerical choices by name)
     ends = [float(end) for end in axis.values[[0, -1]]]
     asked: dict[str, Any] = {"n": n, "w": w, "longest": longest, "low": ends[0], "high": ends[1]}
     asked |= {"varied": axis.name} | ({} if start is None else {"start": f"{start}"})
+    if axis.name in {"omega", "frequency_hz"}:
+        dataset.update(backbone.along(pendulum, axis.name))
     values = numerics.provenance() | asked
     what = "orbits are"
     varied.complete(SCHEMA, dataset, pendulum, (axis,), values, summary=_summary, what=what)
@@ -253,6 +258,10 @@ def _dataset(raw: _core.Continuation, axis: Varied, units: Units) -> xr.Dataset:
         "orbit_multipliers": variable(("orbit", *pair), multipliers, "1", multiplier),
         "orbit_stable": flag("orbit", stable, "whether it is stable"),
         "orbit_phases": variable("orbit", phases, long_name="slips + -, sticks 0, in turn"),
+        "orbit_amplitude": variable(
+            "orbit", raw.amplitude, "rad", "half the angle between its outermost turns"
+        ),
+        "orbit_swings": variable("orbit", raw.swings, "1", "swings to and fro over its period"),
         "point_orbit": variable("point", raw.point_orbit, "1", "number of the orbit"),
         **point("point", raw.theta, speed, units.of_velocity, "point_{}"),
         "event_kind": variable("event", kinds, long_name="what happens"),

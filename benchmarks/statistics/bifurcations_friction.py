@@ -1,0 +1,251 @@
+"""Events of ``pendmap continue`` under dry friction, bracketed by runs of scipy.
+
+Pendulums and parameters that vary are drawn at random. Beside every event, at the parameter plus
+and minus 1e-6, the orbit of the branch is sought by Newton's method on a map of scipy (DOP853,
+turns by its events). Events that are alone within that distance on their branch are taken. One is bracketed if both runs say what they must: beyond a fold no orbit,
+before it two; at a doubling or symmetry breaking multipliers on both sides of -1; at an onset of
+sticking or a grazing another sequence of slips and sticks; beyond the boundary of rest an angle
+that friction holds.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import math
+from collections import Counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp  # type: ignore[import-untyped]
+from scipy.optimize import brentq, minimize_scalar  # type: ignore[import-untyped]
+
+import pendmap
+from benchmarks.peers.report import machine, note, say, table
+from pendmap.analysis.result import records
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Floats = NDArray[np.float64]
+RANGES = {
+    "p": (0.1, 1.8),
+    "omega": (1.1, 2.8),
+    "gamma": (0.05, 0.3),
+    "torque": (0.0, 0.3),
+    "theta_r": (0.02, 0.4),
+}
+TYPES = ((2, 0), (1, 0), (1, 1), (2, 1), (4, 0))
+BESIDE = 1e-6
+EVENT = ("kind", "value", "theta", "velocity", "n", "w", "branch", "orbit")
+CRITICAL = {"period_doubling": -1, "symmetry_breaking": 1}
+SHORT = 1e-13
+SETTLED = 1e-10
+FAR = 0.1
+STILL = 1e-9
+NEAR = 40
+
+
+class Motion:
+    """The pendulum with values of p, omega, gamma, torque and theta_r."""
+
+    def __init__(self, values: Floats) -> None:
+        """Keep the values."""
+        self.p, self.omega, self.gamma, self.torque, self.friction = values
+
+    def load(self, tau: float, theta: float) -> float:
+        """Return the acceleration without the friction at rest."""
+        return self.torque - (1 + self.p * math.cos(self.omega * tau)) * math.sin(theta)
+
+    def release(self, tau: float, theta: float, until: float) -> float:
+        """Return the time from which friction no longer holds the pendulum, at most `until`."""
+        times = np.linspace(tau, until, 400)
+
+        def over(t: float) -> float:
+            return abs(self.load(t, theta)) - self.friction
+
+        for a, b in itertools.pairwise(times):
+            if over(a) <= 0 < over(b):
+                return float(brentq(over, a, b, xtol=1e-14))
+        return until
+
+    def flow(self, x: Floats) -> tuple[Floats, str]:
+        """Return the state a period later, and the phases in turn."""
+        tau, end, phases = 0.0, 2 * math.pi / self.omega, ""
+        theta, velocity = x
+        while end - tau > SHORT:
+            if velocity == 0 and abs(self.load(tau, theta)) <= self.friction:
+                phases += "0"
+                tau = self.release(tau, theta, end)
+                if tau >= end:
+                    break
+            sense = math.copysign(1, velocity if velocity != 0 else self.load(tau, theta))
+            phases += "+" if sense > 0 else "-"
+
+            def rates(t: float, y: Floats, sense: float = sense) -> list[float]:
+                return [y[1], self.load(t, y[0]) - self.gamma * y[1] - sense * self.friction]
+
+            def turn(_: float, y: Floats, sense: float = sense) -> float:
+                return sense * y[1]
+
+            turn.terminal, turn.direction = True, -1  # type: ignore[attr-defined]
+            start = [theta, velocity if velocity != 0 else sense * 1e-300]
+            run = solve_ivp(
+                rates,
+                (tau, end),
+                start,
+                "DOP853",
+                rtol=1e-12,
+                atol=1e-14,
+                events=turn,
+                max_step=0.2,
+            )
+            tau, (theta, velocity) = float(run.t[-1]), run.y[:, -1]
+            if run.t_events[0].size:
+                velocity = 0.0
+        return np.array([theta, velocity]), phases
+
+    def slope(self, x: Floats) -> Floats:
+        """Return the derivative of a period by differences; from rest none by the velocity."""
+        step = 1e-6
+        sides = step * np.eye(2)[: 1 if x[1] == 0 else 2]
+        columns = [(self.flow(x + e)[0] - self.flow(x - e)[0]) / (2 * step) for e in sides]
+        return np.array([*columns, *np.zeros((2 - len(columns), 2))]).T
+
+    def orbit(self, points: Floats) -> Floats | None:
+        """Return the points of an orbit near some, one a period, by Newton's method."""
+        points, n = points.copy(), len(points)
+        for _ in range(12):
+            ends = np.array([self.flow(x)[0] for x in points])
+            gap = ends - np.roll(points, -1, axis=0)
+            gap[:, 0] = np.remainder(gap[:, 0] + math.pi, 2 * math.pi) - math.pi
+            if np.abs(gap).max() < SETTLED:
+                return points
+            by = np.zeros((n, 2, n, 2))
+            for k, x in enumerate(points):
+                by[k, :, k] += self.slope(x)
+                by[k, :, (k + 1) % n] -= np.eye(2)
+            step = np.linalg.solve(by.reshape(2 * n, 2 * n), gap.ravel()).reshape(n, 2)
+            if np.abs(step).max() > FAR:
+                return None
+            points = points - step
+            points[np.abs(points[:, 1]) < STILL, 1] = 0.0
+        return None
+
+    def test(self, points: Floats, m: int) -> float:
+        """Return ``det(DP^n - m)`` of an orbit."""
+        whole = np.linalg.multi_dot([np.eye(2), *(self.slope(x) for x in points[::-1])])
+        return float(np.linalg.det(whole - m * np.eye(2)))
+
+    def phases(self, points: Floats) -> tuple[int, int]:
+        """Return the numbers of slips and of sticks around an orbit."""
+        text = "".join(self.flow(x)[1] for x in points)
+        joined = text[:1] + "".join(b for a, b in itertools.pairwise(text) if a != b)
+        joined = joined[:-1] if len(joined) > 1 and joined[0] == joined[-1] else joined
+        return len(joined) - joined.count("0"), joined.count("0")
+
+    def excess(self, theta: float) -> float:
+        """Return the load over the friction at its greatest, where that is least."""
+        low, high = 1 - self.p, 1 + self.p
+
+        def worst(x: float) -> float:
+            return max(abs(self.torque - part * math.sin(x)) for part in (low, high))
+
+        ends = (theta - FAR, theta + FAR)
+        least = minimize_scalar(worst, bounds=ends, method="bounded", options={"xatol": 1e-12})
+        return float(least.fun) - self.friction
+
+
+def around(data: xr.Dataset, event: dict[str, Any]) -> tuple[Floats, Floats, int]:
+    """Return the points of the orbits of an event's branch, their values, and which one it is at."""
+    mine = np.flatnonzero(data["orbit_branch"].values == event["branch"])
+    points = np.stack([data["point_theta"].values, data["point_velocity"].values], axis=-1)
+    first, n = np.searchsorted(data["point_orbit"].values, mine), int(event["n"])
+    x = np.array([points[k : k + n] for k in first])
+    x[:, :, 0] = np.unwrap(x[:, :, 0], axis=0)
+    at = data["orbit_value"].values[mine]
+    place = int(np.flatnonzero(mine == event["orbit"])[0])
+    return x, at, place
+
+
+def beside(x: Floats, at: Floats, place: int, value: float) -> list[Floats]:
+    """Return the points of orbits with a value of the parameter, the nearest to a place first."""
+    pairs = [k for k in range(at.size - 1) if min(at[k : k + 2]) <= value < max(at[k : k + 2])]
+    parts = [(value - at[k]) / (at[k + 1] - at[k]) for k in pairs]
+    orbits = [x[k] + part * (x[k + 1] - x[k]) for k, part in zip(pairs, parts, strict=True)]
+    return sorted(orbits, key=lambda one: float(np.abs(one - x[place]).max()))
+
+
+def bracketed(data: xr.Dataset, event: dict[str, Any], values: Floats, varied: int) -> bool:
+    """Return whether runs on both sides of an event say what they must."""
+    kind = event["kind"]
+    x, at, place = around(data, event)
+    sides = []
+    for by in (-BESIDE, BESIDE):
+        moved = values.copy()
+        moved[varied] = event["value"] + by
+        motion = Motion(moved)
+        near = beside(x, at, place, moved[varied])[: 2 if kind == "fold" else 1]
+        orbits = [motion.orbit(one) for one in near]
+        sides.append((motion, [one for one in orbits if one is not None]))
+    if kind == "rest_boundary":
+        excess = [motion.excess(event["theta"]) for motion, _ in sides]
+        return excess[0] * excess[1] < 0
+    if kind == "fold":
+        (empty, none), (motion, both) = sorted(sides, key=lambda side: len(side[1]))
+        if none or len(both) != 2:  # noqa: PLR2004 (a fold joins two)
+            return False
+        test = [motion.test(x, 1) for x in both]
+        return test[0] * test[1] < 0 and empty.orbit(0.5 * (both[0] + both[1])) is None
+    if not all(orbits for _, orbits in sides):
+        return False
+    if kind in {"period_doubling", "symmetry_breaking"}:
+        test = [motion.test(orbits[0], CRITICAL[kind]) for motion, orbits in sides]
+        return test[0] * test[1] < 0
+    seen = [motion.phases(orbits[0]) for motion, orbits in sides]
+    return seen[0] != seen[1]
+
+
+def main() -> None:
+    """Print how many events are bracketed."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--count", type=int, default=50, help="events")
+    parser.add_argument("--seed", type=int, default=1)
+    asked = parser.parse_args()
+    say(machine(["pendmap", "scipy"]))
+    draw, names = np.random.default_rng(asked.seed), list(RANGES)
+    right: Counter[str] = Counter()
+    every: Counter[str] = Counter()
+    k = 0
+    while every.total() < asked.count:
+        values = np.array([draw.uniform(*ends) for ends in RANGES.values()])
+        values[3] *= k % 2
+        varied, (n, w) = int(draw.integers(0, 5)), TYPES[k % len(TYPES)]
+        k += 1
+        model = pendmap.Pendulum(**dict(zip(names, values.tolist(), strict=True)))
+        ranges = {names[varied]: RANGES[names[varied]]}
+        result = pendmap.continuation(model, ranges, n=n, w=w, longest=2 * n)
+        events = records(result, **{key: f"event_{key}" for key in EVENT})
+        alone = [
+            one
+            for one in events
+            if sum(
+                other["branch"] == one["branch"] and abs(other["value"] - one["value"]) < 2 * BESIDE
+                for other in events
+            )
+            == 1
+        ]
+        draw.shuffle(alone)
+        for event in alone[:3]:
+            ok = bracketed(result, event, values, varied)
+            every[event["kind"]] += 1
+            right[event["kind"]] += ok
+            if not ok:
+                say(f"not bracketed: {names}={values.tolist()} {names[varied]} {event}")
+        note(f"{every.total()} of {asked.count}")
+    say(table(["event", "number", "bracketed"], [[x, str(every[x]), str(right[x])] for x in every]))
+
+
+if __name__ == "__main__":
+    main()
