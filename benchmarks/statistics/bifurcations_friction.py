@@ -1,11 +1,11 @@
 """Events of ``pendmap continue`` under dry friction, bracketed by runs of scipy.
 
 Pendulums and parameters that vary are drawn at random. Beside every event, at the parameter plus
-and minus 1e-6, the orbit of the branch is sought by Newton's method on a map of scipy (DOP853,
-turns by its events). Events that are alone within that distance on their branch are taken. One is bracketed if both runs say what they must: beyond a fold no orbit,
-before it two; at a doubling or symmetry breaking multipliers on both sides of -1; at an onset of
-sticking or a grazing another sequence of slips and sticks; beyond the boundary of rest an angle
-that friction holds.
+and minus 1e-6, the orbit of the branch is sought by Newton's method on a map of scipy (DOP853).
+Events that are alone within twice that distance on their branch are taken. One is bracketed if
+both runs say what they must: beyond a fold no orbit, before it two; at a doubling or symmetry
+breaking multipliers on both sides of the critical one; at an onset of sticking or a grazing another
+sequence of slips and sticks; beyond the boundary of rest an angle that friction holds.
 """
 
 from __future__ import annotations
@@ -41,10 +41,36 @@ BESIDE = 1e-6
 EVENT = ("kind", "value", "theta", "velocity", "n", "w", "branch", "orbit")
 CRITICAL = {"period_doubling": -1, "symmetry_breaking": 1}
 SHORT = 1e-13
+TINY = 1e-300
+SAMPLES = 60
 SETTLED = 1e-10
 FAR = 0.1
 STILL = 1e-9
 NEAR = 40
+
+
+def first_turn(solution: Any, sense: float, start: float, end: float) -> tuple[float, bool]:  # noqa: ANN401
+    """Return when a velocity of this sense first passes 0, also for a moment, or the end."""
+
+    def speed(t: float) -> float:
+        return float(sense * solution(t)[1])
+
+    times = np.linspace(start, end, 2 + int(SAMPLES * (end - start)))
+    values = sense * solution(times)[1]
+    for k in range(1, times.size):
+        low, high = times[k - 1], times[k]
+        if values[k] > 0 and k + 1 < times.size and values[k] < min(values[k - 1], values[k + 1]):
+            # A minimum: it may be below 0 between the samples.
+            ends = (low, times[k + 1])
+            least = minimize_scalar(speed, bounds=ends, method="bounded", options={"xatol": 1e-9})
+            high = least.x if least.fun < 0 else high
+        if speed(high) < 0 and k > 1:
+            return float(brentq(speed, low, high, xtol=1e-15)), True
+        if speed(high) < 0:
+            # From rest the velocity has its sense at first.
+            near = start + 1e-6 * (high - start)
+            return float(brentq(speed, near, high, xtol=1e-15)), True
+    return end, False
 
 
 class Motion:
@@ -86,23 +112,12 @@ class Motion:
             def rates(t: float, y: Floats, sense: float = sense) -> list[float]:
                 return [y[1], self.load(t, y[0]) - self.gamma * y[1] - sense * self.friction]
 
-            def turn(_: float, y: Floats, sense: float = sense) -> float:
-                return sense * y[1]
-
-            turn.terminal, turn.direction = True, -1  # type: ignore[attr-defined]
-            start = [theta, velocity if velocity != 0 else sense * 1e-300]
-            run = solve_ivp(
-                rates,
-                (tau, end),
-                start,
-                "DOP853",
-                rtol=1e-12,
-                atol=1e-14,
-                events=turn,
-                max_step=0.2,
-            )
-            tau, (theta, velocity) = float(run.t[-1]), run.y[:, -1]
-            if run.t_events[0].size:
+            start = [theta, velocity if velocity != 0 else sense * TINY]
+            at: dict[str, Any] = {"rtol": 1e-12, "atol": 1e-14, "dense_output": True}
+            run = solve_ivp(rates, (tau, end), start, "DOP853", **at)
+            tau, turns = first_turn(run.sol, sense, tau, end)
+            theta, velocity = run.sol(tau)
+            if turns:
                 velocity = 0.0
         return np.array([theta, velocity]), phases
 
@@ -158,7 +173,7 @@ class Motion:
 
 
 def around(data: xr.Dataset, event: dict[str, Any]) -> tuple[Floats, Floats, int]:
-    """Return the points of the orbits of an event's branch, their values, and which one it is at."""
+    """Return the points of the orbits of an event's branch, their values, and its place."""
     mine = np.flatnonzero(data["orbit_branch"].values == event["branch"])
     points = np.stack([data["point_theta"].values, data["point_velocity"].values], axis=-1)
     first, n = np.searchsorted(data["point_orbit"].values, mine), int(event["n"])
@@ -207,6 +222,12 @@ def bracketed(data: xr.Dataset, event: dict[str, Any], values: Floats, varied: i
     return seen[0] != seen[1]
 
 
+def is_alone(event: dict[str, Any], places: list[tuple[int, float]]) -> bool:
+    """Return whether no other event and no end of the branch lies beside an event."""
+    mine = [abs(value - event["value"]) for branch, value in places if branch == event["branch"]]
+    return all(away == 0 or away > 2 * BESIDE for away in mine)
+
+
 def main() -> None:
     """Print how many events are bracketed."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -227,15 +248,10 @@ def main() -> None:
         ranges = {names[varied]: RANGES[names[varied]]}
         result = pendmap.continuation(model, ranges, n=n, w=w, longest=2 * n)
         events = records(result, **{key: f"event_{key}" for key in EVENT})
-        alone = [
-            one
-            for one in events
-            if sum(
-                other["branch"] == one["branch"] and abs(other["value"] - one["value"]) < 2 * BESIDE
-                for other in events
-            )
-            == 1
-        ]
+        places = [(one["branch"], one["value"]) for one in events]
+        for end in ("branch_first", "branch_last"):
+            places += list(enumerate(result[end].values.tolist()))
+        alone = [one for one in events if is_alone(one, places)]
         draw.shuffle(alone)
         for event in alone[:3]:
             ok = bracketed(result, event, values, varied)

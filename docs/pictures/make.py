@@ -134,6 +134,9 @@ def planes() -> None:
     render.draw(bifurcation(Pendulum(), {"p": (0.9, 2.0, 2000)}), HERE / "bifurcation.png", dpi=110)
     branches = continuation(Pendulum(omega=1.8), {"p": (0.05, 1.3)}, n=2, longest=4)
     render.draw(branches, HERE / "continuation.png", dpi=110)
+    weak = Pendulum(gamma=0.05, p=0.3, theta_r=0.02)
+    resonance = continuation(weak, {"omega": (1.2, 2.4)}, n=2, longest=2)
+    render.draw(resonance, HERE / "resonance.png", dpi=110, layer="resonance")
 
 
 def in_axes() -> None:
