@@ -101,6 +101,7 @@ SMALL: Final = {
     "lyapunov": ["--precision=0.1", "--max-periods=50"],
     "map": ["--p=0.5:1:3", "--omega=1.8:2:2"],
     "melnikov": [],
+    "backbone": [],
     "orbit": ["--grid=12"],
     "paper": ["3"],
     "plot": ["in.nc"],

@@ -58,6 +58,7 @@ SMALL: dict[str, Callable[..., xr.Dataset]] = {
     ),
     "tongues": lambda model, **more: pendmap.tongues(model, [1.9, 2.0], 4.0, **more),
     "melnikov": lambda model, **more: pendmap.melnikov(model, [1.9, 2.0], **more),
+    "backbone": lambda model, **more: pendmap.backbone(model, count=3, **more),
 }
 FUNCTIONS = [name for _, names, _ in pendmap.ANALYSES.values() for name in names]
 RESULTS = {name: SMALL.get(name) or getattr(pendmap, name) for name in FUNCTIONS}

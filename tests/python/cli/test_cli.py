@@ -50,6 +50,7 @@ SMALL = {
     "lifetime": "--starts 100 --max-periods 300",
     "tongues": "--omega 1.5:2.5:4 --p-max 2",
     "melnikov": "--omega 1.5",
+    "backbone": "--count 5",
 }
 ROWS = {
     "basins": {"attractors": {"id", "name", "kind", "n", "w", "multipliers", "fraction"}},

@@ -30,6 +30,7 @@ RESULTS: dict[str, Callable[[], xr.Dataset]] = {
     "lifetime": lambda: pendmap.lifetime(DRAWN, starts=100, draws=2),
     "lyapunov": lambda: pendmap.lyapunov(SI),
     "melnikov": lambda: pendmap.melnikov(BARE, [1.0, 2.0]),
+    "backbone": lambda: pendmap.backbone(BARE, count=3),
     "orbits": lambda: pendmap.orbit(DRAWN, 1, 1, Grid.square(20, 6.2)),
     "parameter_map": lambda: pendmap.parameter_map(DRAWN, PLANE, starts=2, draws=2, curves=True),
     "tongues": lambda: pendmap.tongues(DRAWN, [1.9, 2.0]),

@@ -86,6 +86,7 @@ RESULTS: dict[str, Callable[[], Any]] = {
     "lifetime": lambda: pendmap.lifetime(Pendulum(p=1.7), starts=200),
     "tongues": lambda: pendmap.tongues(Pendulum(), np.linspace(0.5, 3.0, 20)),
     "melnikov": lambda: pendmap.melnikov(Pendulum()),
+    "backbone": lambda: pendmap.backbone(Pendulum(), count=5),
     "record": lambda: experiment(1),
     "records": lambda: experiment(3),
     "whole": lambda: identified(*record(decay(), offset=math.radians(0.05), counts=4096)),
