@@ -63,8 +63,9 @@ SCHEMA = Schema(
 def backbone(pendulum: Pendulum | Rig, *, energy_max: float = 6.0, count: int = 100) -> xr.Dataset:
     """Return the motions of a pendulum without losses and drive, by their energy.
 
-    Damping, friction and drive of the model are left out; effects stay, and must be forces of the
-    angle alone. A motion of energy ``E`` over that of rest has the period
+    Damping, friction and drive of the model are left out, and of effects all that is odd in the
+    velocity; what stays must be forces of the angle alone. A motion of energy ``E`` over that of
+    rest has the period
 
     ``T = 2 int dth / sqrt(2 (E - V(th)))`` from one turn to the other,
 
@@ -92,7 +93,7 @@ def backbone(pendulum: Pendulum | Rig, *, energy_max: float = 6.0, count: int = 
     Raises
     ------
     InputError
-        If a force depends on the velocity or on time, or an effect counts turns.
+        If an effect depends on time or in an even way on the velocity, or counts turns.
 
     References
     ----------
@@ -194,11 +195,13 @@ class _Force:
         self.angles = 2 * math.pi * (np.arange(_PLACES) + 0.5) / _PLACES - math.pi
         with core_errors():
             forces = self.at(self.angles)
-            moved = [self.at(self.angles, *x) for x in ((0.0, 0.7), (0.0, -1.3), (1.1, 0.0))]
-        if max(float(np.abs(x - forces).max()) for x in moved) > _NONE:
+            even = [
+                0.5 * (self.at(self.angles, 0, v) + self.at(self.angles, 0, -v)) for v in (1, 2)
+            ]
+        if any(np.abs(x - forces).max() > _NONE for x in [*even, self.at(self.angles, 1.1)]):
             raise InputError(
-                "effects must be forces of the angle alone for a backbone, got one that depends on "
-                "the velocity or on time"
+                "effects must be losses, odd in the velocity, or forces of the angle alone for a "
+                "backbone, got one that is neither"
             )
         mean = float(forces.mean())
         self.torque = mean if abs(mean) > _NONE else 0.0

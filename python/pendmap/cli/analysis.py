@@ -190,6 +190,11 @@ _ENTRIES: Final = {
         ),
         model=functools.partial(model_options, left_out=("omega", "frequency_hz")),
     ),
+    "backbone": Entry(
+        "List motions without losses and drive, by energy: amplitude, period, rate.",
+        ("pendmap backbone", "pendmap backbone --torque 0.2 --json"),
+        example="--energy-max 6",
+    ),
     "melnikov": Entry(
         """Compute the amplitude at which homoclinic tangles begin, by Melnikov's criterion.
 
