@@ -50,6 +50,8 @@ pub enum End {
     Fast,
     /// Branches cross there.
     Crossing,
+    /// The sequence of slips and sticks changes.
+    Phases,
     /// Newton's method fails at any step; with the norm of the derivative of a period.
     Lost(f64),
 }
@@ -66,6 +68,7 @@ impl End {
             Self::Sticks => "sticks for ever",
             Self::Fast => "velocity out of bounds",
             Self::Crossing => "branches cross",
+            Self::Phases => "slips and sticks change",
             Self::Lost(_) => "precision lost",
         }
     }

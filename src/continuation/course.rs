@@ -92,6 +92,16 @@ impl Course {
         Self { base: base.clone(), axes: vec![vec![(parameter, Law::IDENTITY)]] }
     }
 
+    /// The course of one of two coordinates, the other one being held.
+    #[must_use]
+    pub fn along(&self, axis: usize, held: f64) -> Self {
+        let mut axes = vec![self.axes[axis].clone()];
+        for (parameter, law) in &self.axes[1 - axis] {
+            axes[0].push((*parameter, Law::Quadratic([law.at(held)[0], 0.0, 0.0])));
+        }
+        Self { base: self.base.clone(), axes }
+    }
+
     /// The value of a parameter, and its derivative by each coordinate; none if it does not vary.
     fn value(&self, parameter: Parameter, at: &[f64]) -> Option<(f64, [f64; 2])> {
         let mut found = None::<(f64, [f64; 2])>;

@@ -61,6 +61,14 @@ pub struct Type {
     pub centre: f64,
 }
 
+impl Type {
+    /// Whether period, turns and closure are the same.
+    #[must_use]
+    pub fn is_like(&self, other: &Self) -> bool {
+        (self.n, self.w, self.closure) == (other.n, other.w, other.closure)
+    }
+}
+
 /// Orbits of one type along a course of one coordinate.
 #[derive(Clone, Copy, Debug)]
 pub struct Cycles<'a> {
@@ -100,12 +108,13 @@ pub struct Orbit {
 }
 
 /// The system at one place.
-struct System {
-    gap: DVector<f64>,
+pub(super) struct System {
+    pub(super) gap: DVector<f64>,
     /// Its derivatives by the place.
-    matrix: DMatrix<f64>,
-    images: Vec<Image>,
-    norm: f64,
+    pub(super) matrix: DMatrix<f64>,
+    pub(super) images: Vec<Image>,
+    /// Largest norm of a derivative.
+    pub(super) norm: f64,
 }
 
 impl Cycles<'_> {
@@ -125,7 +134,7 @@ impl Cycles<'_> {
         self.parts().iter().sum()
     }
 
-    fn root(&self) -> f64 {
+    pub(super) fn root(&self) -> f64 {
         (self.count() as f64).sqrt()
     }
 
@@ -150,6 +159,13 @@ impl Cycles<'_> {
         place[place.len() - 1] * self.scale
     }
 
+    /// All coordinates of a place.
+    #[must_use]
+    pub fn coordinates(&self, place: &DVector<f64>) -> Vec<f64> {
+        let first = place.len() - self.course.axes.len();
+        place.iter().skip(first).map(|x| x * self.scale).collect()
+    }
+
     /// The unit vector along the coordinate.
     #[must_use]
     pub fn along(&self) -> DVector<f64> {
@@ -159,7 +175,7 @@ impl Cycles<'_> {
     }
 
     /// The sign of the closing map, and its shift.
-    fn closing(&self) -> (f64, f64) {
+    pub(super) fn closing(&self) -> (f64, f64) {
         match self.of.closure {
             Closure::Whole | Closure::Rest => (1.0, -TAU * self.of.w as f64),
             Closure::Half => (-1.0, 2.0 * self.of.centre),
@@ -270,7 +286,7 @@ impl Cycles<'_> {
         Some(self.finished(place, system, tangent, orientation, moved))
     }
 
-    fn finished(
+    pub(super) fn finished(
         &self,
         place: DVector<f64>,
         system: &System,
@@ -350,8 +366,7 @@ impl Cycles<'_> {
             return points;
         }
         // The second half passes the section half a period after the mirrored points of the first.
-        let at = self.at(place);
-        let map = Period::<3>::new(self.course, &[at]);
+        let map = Period::<3>::new(self.course, &self.coordinates(place));
         let first = map.images(&points[..whole], 0.5);
         points.extend(first.into_iter().map(|between| image(between.state)));
         points
@@ -359,7 +374,7 @@ impl Cycles<'_> {
 }
 
 /// The factors of a system with one more row.
-fn bordered(matrix: &DMatrix<f64>, row: &DVector<f64>) -> LU<f64, Dyn, Dyn> {
+pub(super) fn bordered(matrix: &DMatrix<f64>, row: &DVector<f64>) -> LU<f64, Dyn, Dyn> {
     let count = matrix.nrows();
     let mut whole = matrix.clone().insert_row(count, 0.0);
     whole.row_mut(count).copy_from(&row.transpose());

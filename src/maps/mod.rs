@@ -9,7 +9,7 @@
 //!   exponents of many trajectories
 //! - [`orbits`]: all periodic orbits of one period and winding; `multistart`: starting points of
 //!   Newton's method
-//! - [`branches`]: all branches of orbits of one type along a parameter
+//! - [`branches`]: all branches of orbits of one type along a parameter; [`curves`]: the bifurcation set of a plane
 //! - [`parameter_map`]: the attractors over a plane of two parameters; [`survey`]: its blocks; [`cell`],
 //!   [`resolution`]: one pendulum of it, and its step length
 //! - [`bifurcation`]: the attractors along one parameter, and one followed up and down
@@ -32,6 +32,7 @@ pub mod cell;
 mod chebyshev;
 mod continuation;
 pub mod control;
+pub mod curves;
 pub mod ensemble;
 pub mod finite_time;
 mod kinked_tongues;

@@ -1,0 +1,84 @@
+//! The cubic coefficient at a doubling or at a symmetry breaking.
+//!
+//! At the distance `e` along the null vector `v` the new orbit is `x + e v + e^2 u`, by the order `e^2` of the closing
+//! system with `u = -W(1)^-1 B(v, v) / 2`: `u` closes like the old orbit. The order `e^3` is
+//! `mu + c e^2 = 0` for the change `mu` of the multiplier, with `c = w (C(v, v, v) / 6 + B(v, u)) / (w v)`
+//! (Kuznetsov 2004, Elements of Applied Bifurcation Theory, section 5.4.2). About rest `B = 0`.
+//!
+//! `B` and `C` are the second and third derivatives of the map. They are differences of exact first derivatives on both
+//! sides, at three distances, without the first two terms of the error.
+
+use nalgebra::{DVector, Matrix2, Vector2};
+
+use super::critical::{Critical, Point};
+use super::cycle::Closure;
+use super::event::Kind;
+use super::period::{Image, Period};
+
+/// The shortest displacement along the null vector; others are twice and three times as long. Where phases change
+/// within, they are shortened by a factor, this many times at most.
+const BESIDE: f64 = 8e-3;
+const SHORTER: f64 = 0.2;
+const TIMES: i32 = 4;
+/// A product of the null vectors below this is 0.
+const NONE: f64 = 1e-9;
+/// Weights of differences at distances 1, 2 and 3 that leave errors of the sixth power.
+const WEIGHTS: [f64; 3] = [1.5, -0.6, 0.1];
+
+impl Critical<'_> {
+    /// Whether the new orbits live beyond the loss of stability of the old one; none at folds, where that is not known, and
+    /// without damping.
+    #[must_use]
+    pub fn is_supercritical(&self, point: &Point) -> Option<bool> {
+        let (c, scalar) = (point.coefficient, point.border.scalar());
+        let known = self.kind != Kind::Fold && c.is_finite() && scalar.abs() > NONE;
+        known.then_some(self.multiplier() * c * scalar < 0.0)
+    }
+
+    /// The coefficient `w v c`; none where the sequence of phases changes nearby.
+    #[must_use]
+    pub fn cubic(&self, point: &Point) -> Option<f64> {
+        (0..TIMES).find_map(|k| self.cubic_within(point, BESIDE * SHORTER.powi(k)))
+    }
+
+    fn cubic_within(&self, point: &Point, distance: f64) -> Option<f64> {
+        let place = &point.orbit.place;
+        let [left, right] = point.border.vectors();
+        let points = self.points(place);
+        let map = Period::<4>::new(self.cycles.course, &Self::at(place));
+        let distances = [1.0, 2.0, 3.0].map(|times| times * distance);
+        let laps: Vec<_> = std::iter::once(0.0)
+            .chain(distances.into_iter().flat_map(|by| [by, -by]))
+            .map(|by| Self::beside(&points, right, by))
+            .collect();
+        let images = self.images(&map, &laps);
+        let phases = |lap: &[Image]| lap.iter().map(|image| image.phases.clone()).collect::<Vec<_>>();
+        let own = phases(&images[0]);
+        if images.iter().any(|lap| phases(lap) != own) {
+            return None;
+        }
+        // Of each part, the first derivatives' derivative along `v`, and the second one.
+        let (factors, count) = (self.factors(), points.len());
+        let at = |lap: usize, i: usize| images[lap][i].by_state;
+        let mut first = vec![Matrix2::zeros(); count];
+        let mut second = vec![Matrix2::zeros(); count];
+        for (k, (by, weight)) in distances.into_iter().zip(WEIGHTS).enumerate() {
+            for i in 0..count {
+                let [above, below] = [at(2 * k + 1, i), at(2 * k + 2, i)];
+                first[i] += (above - below) * (weight * factors[i] / (2.0 * by));
+                second[i] += (above - at(0, i) * 2.0 + below) * (weight * factors[i] / (by * by));
+            }
+        }
+        let of = |vector: &DVector<f64>, i: usize| Vector2::new(vector[2 * i], vector[2 * i + 1]);
+        let mut bent = DVector::zeros(2 * count);
+        if self.cycles.of.closure != Closure::Rest {
+            for i in 0..count {
+                bent.rows_mut(2 * i, 2).copy_from(&(first[i] * of(right, i) * -0.5));
+            }
+            bent = self.cycles.weak(&point.orbit.parts, 1.0).lu().solve(&bent)?;
+        }
+        let third = |i: usize| second[i] * of(right, i) / 6.0 + first[i] * of(&bent, i);
+        let sum: f64 = (0..count).map(|i| of(left, i).dot(&third(i))).sum();
+        Some(sum)
+    }
+}
