@@ -131,7 +131,8 @@ impl Cycles<'_> {
                 if refused == Some(End::Sticks) {
                     transition::swallowed(&mut run);
                 }
-                let Some(after) = refused.is_none().then(|| self.turned_back(&here)).flatten() else {
+                let Some(after) = refused.is_none().then(|| self.turned_back(&here)).flatten()
+                else {
                     return Ok((run, refused.unwrap_or(End::Lost(here.norm))));
                 };
                 transition::crossed(&mut run, &here, after);
@@ -218,7 +219,7 @@ impl Cycles<'_> {
             *refused = Some(End::Crossing);
             return Step::Long(CHANGE[0]);
         }
-        if next.place.amax() > FASTEST {
+        if self.points(&next.place).iter().any(|point| point[1].abs() > FASTEST) {
             return Step::Over(End::Fast, None);
         }
         Step::On(Box::new(next), (1.0 / worst).clamp(0.5, CHANGE[1]))
@@ -244,7 +245,7 @@ impl Cycles<'_> {
         }
         let mut guess = self.interpolated(a, b, (at - low) / (high - low));
         let last = guess.len() - 1;
-        guess[last] = at / self.scale;
+        guess[last] = self.along_range(at);
         let mut row = self.along();
         if b.tangent[last] < 0.0 {
             row.neg_mut();

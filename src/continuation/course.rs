@@ -35,8 +35,7 @@ impl Law {
             return Err(few("2 or more"));
         }
         let [first, middle, last] = [0, count / 2, count - 1];
-        let slope =
-            |a: usize, b: usize| (values[b] - values[a]) / (places[b] - places[a]);
+        let slope = |a: usize, b: usize| (values[b] - values[a]) / (places[b] - places[a]);
         let bend = if count > 2 {
             (slope(middle, last) - slope(first, middle)) / (places[last] - places[first])
         } else {
@@ -45,11 +44,8 @@ impl Law {
         // Newton's form about the first and the last place.
         let (x, y) = (places[first], places[last]);
         let rise = slope(first, last);
-        let law = Self::Quadratic([
-            values[first] - rise * x + bend * x * y,
-            rise - bend * (x + y),
-            bend,
-        ]);
+        let law =
+            Self::Quadratic([values[first] - rise * x + bend * x * y, rise - bend * (x + y), bend]);
         let size = values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
         let fits = |(place, value): (&f64, &f64)| (law.at(*place)[0] - value).abs() <= 1e-12 * size;
         if places.iter().zip(values).all(fits) {

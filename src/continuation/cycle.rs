@@ -78,14 +78,17 @@ pub struct Cycles<'a> {
     pub of: Type,
     /// The symmetry along the whole course.
     pub symmetry: Option<Symmetry>,
-    /// The unit of the coordinate, in which distances along a branch are measured.
+    /// Origin and unit of the coordinate in which distances along a branch are measured: the start of the range and its
+    /// length.
+    pub origin: f64,
+    /// See `origin`.
     pub scale: f64,
 }
 
 /// A closed orbit, and what is known of its neighbours.
 #[derive(Clone, Debug)]
 pub struct Orbit {
-    /// Points, one a period, angles not wrapped, over the root of their number; last the coordinate over its unit.
+    /// Points, one a period, angles not wrapped, over the root of their number; last the coordinate in its unit.
     pub place: DVector<f64>,
     /// Unit vector along the branch.
     pub tangent: DVector<f64>,
@@ -142,7 +145,7 @@ impl Cycles<'_> {
     #[must_use]
     pub fn place(&self, points: &[State], at: f64) -> DVector<f64> {
         let root = self.root();
-        let numbers = points.iter().flatten().map(|x| x / root).chain([at / self.scale]);
+        let numbers = points.iter().flatten().map(|x| x / root).chain([self.along_range(at)]);
         DVector::from_iterator(2 * points.len() + 1, numbers)
     }
 
@@ -156,7 +159,13 @@ impl Cycles<'_> {
     /// The coordinate of a place.
     #[must_use]
     pub fn at(&self, place: &DVector<f64>) -> f64 {
-        place[place.len() - 1] * self.scale
+        self.origin + place[place.len() - 1] * self.scale
+    }
+
+    /// A coordinate from the origin on, in the unit.
+    #[must_use]
+    pub fn along_range(&self, at: f64) -> f64 {
+        (at - self.origin) / self.scale
     }
 
     /// All coordinates of a place.
@@ -275,7 +284,7 @@ impl Cycles<'_> {
     ) -> Option<Orbit> {
         let count = system.gap.len();
         let (tangent, orientation) = if self.of.closure == Closure::Rest {
-            (row.clone(), 1.0)
+            (row.clone(), row[count].signum())
         } else {
             let factors = bordered(&system.matrix, row);
             let mut last = DVector::zeros(count + 1);
@@ -325,7 +334,8 @@ impl Cycles<'_> {
                 for column in 0..2 {
                     matrix[(2 * i + row, 2 * i + column)] += factor * part[(row, column)];
                 }
-                matrix[(2 * i + row, (2 * i + 2 + row) % (2 * count))] -= if last { m } else { 1.0 };
+                matrix[(2 * i + row, (2 * i + 2 + row) % (2 * count))] -=
+                    if last { m } else { 1.0 };
             }
         }
         matrix

@@ -84,16 +84,12 @@ fn circle(_: &Cycles<'_>, orbit: &Orbit) -> f64 {
 /// Adds what happens between the last orbit of the run, `here`, and `next`, and `next` itself.
 pub(super) fn between(cycles: &Cycles<'_>, here: &Orbit, next: &Orbit, run: &mut Run) {
     let tests: &[(Kind, Test)] = match cycles.of.closure {
-        Closure::Whole => &[
-            (Kind::Fold, fold),
-            (Kind::PeriodDoubling, minus),
-            (Kind::NeimarkSacker, circle),
-        ],
-        Closure::Half => &[
-            (Kind::Fold, fold),
-            (Kind::SymmetryBreaking, minus),
-            (Kind::NeimarkSacker, circle),
-        ],
+        Closure::Whole => {
+            &[(Kind::Fold, fold), (Kind::PeriodDoubling, minus), (Kind::NeimarkSacker, circle)]
+        }
+        Closure::Half => {
+            &[(Kind::Fold, fold), (Kind::SymmetryBreaking, minus), (Kind::NeimarkSacker, circle)]
+        }
         Closure::Rest => &[
             (Kind::SymmetryBreaking, plus),
             (Kind::PeriodDoubling, minus),

@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 use super::branch::{Bounds, End, Run};
 use super::course::Course;
 use super::cycle::{Closure, Cycles, Orbit, Type};
-use super::event::Event;
+use super::event::{Event, Kind};
 use super::period::Period;
 use crate::error::Error;
 use crate::integrate::State;
@@ -79,7 +79,8 @@ impl Family {
     #[must_use]
     pub fn cycles(&self, of: Type) -> Cycles<'_> {
         let Bounds { low, high } = self.bounds;
-        Cycles { course: &self.course, of, symmetry: self.symmetry, scale: high - low }
+        let (course, symmetry) = (&self.course, self.symmetry);
+        Cycles { course, of, symmetry, origin: low, scale: high - low }
     }
 
     /// Whether a branch passes through the orbit, or through its mirror image, at this coordinate.
@@ -102,7 +103,12 @@ impl Family {
     ///
     /// # Errors
     /// [`Error::Interrupted`] if `cancel` is set.
-    pub fn add(&mut self, orbit: &PeriodicOrbit, at: f64, cancel: &AtomicBool) -> Result<bool, Error> {
+    pub fn add(
+        &mut self,
+        orbit: &PeriodicOrbit,
+        at: f64,
+        cancel: &AtomicBool,
+    ) -> Result<bool, Error> {
         let Some((of, points)) = self.type_of(orbit, at) else { return Ok(false) };
         let cycles = self.cycles(of);
         let Some(first) = cycles.near(&cycles.place(&points, at), &cycles.along()) else {
@@ -160,23 +166,30 @@ impl Family {
                 let cycles = self.cycles(branch.of);
                 let orbit = &branch.run.orbits[orbit];
                 let Some(of) = cycles.shed_type(kind) else { continue };
-                let Some(shed) = cycles.shed(orbit, kind) else { continue };
+                let place = (cycles.all_points(&orbit.place), cycles.at(&orbit.place));
                 // Along the coordinate, a multiplier is beyond the critical value where the test falls below 0.
                 let last = orbit.tangent.len() - 1;
                 let beyond = -rises * orbit.tangent[last].signum();
-                let supercritical = shed.side * beyond > 0.0;
-                let known = self.end_at(of, &cycles.all_points(&orbit.place), cycles.at(&orbit.place));
-                let new = match known {
-                    None if of.n <= self.longest => {
-                        Some(self.cycles(of).from_parent(&shed.orbits, self.bounds, cancel)?)
+                // Without the mirror image at once both twins are followed.
+                let both =
+                    kind == Kind::SymmetryBreaking && self.symmetry != Some(Symmetry::AtOnce);
+                let senses: &[f64] = if both { &[1.0, -1.0] } else { &[1.0] };
+                let mut side = None;
+                let mut new = Vec::new();
+                for sense in senses {
+                    let Some(shed) = cycles.shed(orbit, kind, *sense) else { continue };
+                    side = Some(shed.side);
+                    if self.end_at(of, &place.0, place.1).is_none() && of.n <= self.longest {
+                        let cycles = self.cycles(of);
+                        new.push(cycles.from_parent(&shed.orbits, self.bounds, cancel)?);
                     }
-                    _ => None,
-                };
-                self.branches[next].run.events[number].supercritical = Some(supercritical);
-                if let Some((branch, end)) = known {
+                }
+                while let Some((branch, end)) = self.end_at(of, &place.0, place.1) {
                     self.branches[branch].meets[end] = Some((next, number));
                 }
-                if let Some(mut branch) = new {
+                let event = &mut self.branches[next].run.events[number];
+                event.supercritical = side.map(|side| side * beyond > 0.0);
+                for mut branch in new {
                     branch.meets[0] = Some((next, number));
                     self.branches.push(branch);
                 }
@@ -198,14 +211,15 @@ impl Family {
             let orbits = [branch.run.orbits.first(), branch.run.orbits.last()];
             for (end, orbit) in orbits.into_iter().enumerate() {
                 let Some(orbit) = orbit else { continue };
-                if !matches!(branch.ends[end], End::Rest | End::Parent) || branch.meets[end].is_some() {
+                if !matches!(branch.ends[end], End::Rest | End::Parent)
+                    || branch.meets[end].is_some()
+                {
                     continue;
                 }
                 let first = cycles.points(&orbit.place)[0];
                 let image = [-first[0], -first[1]];
-                let near = |state: State| {
-                    points.iter().any(|point| angle.distance(*point, state) < MEETS)
-                };
+                let near =
+                    |state: State| points.iter().any(|point| angle.distance(*point, state) < MEETS);
                 let beside = ((cycles.at(&orbit.place) - at) / cycles.scale).abs() < MEETS;
                 if beside && (near(first) || (mirrored && near(image))) {
                     return Some((index, end));
@@ -253,7 +267,12 @@ impl Branch {
 
 impl Cycles<'_> {
     /// The branch through an orbit, in both senses.
-    fn both_ways(&self, first: Orbit, bounds: Bounds, cancel: &AtomicBool) -> Result<Branch, Error> {
+    fn both_ways(
+        &self,
+        first: Orbit,
+        bounds: Bounds,
+        cancel: &AtomicBool,
+    ) -> Result<Branch, Error> {
         let none = (None, [None; 2]);
         let (ahead, end) = self.followed(first.clone(), bounds, cancel)?;
         if end == End::Closed {

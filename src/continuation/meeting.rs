@@ -94,7 +94,11 @@ impl Cycles<'_> {
 
     /// The orbit of another type near a place at which one of its tests vanishes, by the secant method, as an orbit of this
     /// type.
-    fn met(&self, (of, test): (Type, usize), near: &nalgebra::DVector<f64>) -> Option<nalgebra::DVector<f64>> {
+    fn met(
+        &self,
+        (of, test): (Type, usize),
+        near: &nalgebra::DVector<f64>,
+    ) -> Option<nalgebra::DVector<f64>> {
         let other = Cycles { of, ..*self };
         let mut points = self.points(near);
         if of.closure == Closure::Rest {

@@ -66,10 +66,10 @@ impl<'a, const N: usize> Period<'a, N> {
         Self { course, at: at.to_vec(), pendulum, ode }
     }
 
-    /// Whether the acceleration jumps with the sense of the motion.
+    /// Whether the acceleration jumps with the sense of the motion, here or elsewhere on the course.
     #[must_use]
     pub fn rubs(&self) -> bool {
-        self.ode.as_ref().is_some_and(OdeProblem::jumps)
+        self.ode.as_ref().is_some_and(OdeProblem::jumps) || self.course.varies_friction()
     }
 
     /// The images of states at the beginning of a period this part of a period later.
@@ -97,7 +97,7 @@ impl<'a, const N: usize> Period<'a, N> {
                 Piece::Step => Phase::moving(driver.dense.signs[0]),
                 Piece::Rest(..) => Phase::Stick,
             };
-            if ode.jumps() && phases.last() != Some(&phase) {
+            if self.rubs() && phases.last() != Some(&phase) {
                 phases.push(phase);
             }
         }

@@ -10,7 +10,10 @@ use crate::integrate::State;
 use crate::model::pendulum::Symmetry;
 
 /// Distances along the eigenvector at which the new branch is begun, the first that succeeds.
-const DISTANCES: [f64; 4] = [1e-2, 3e-3, 1e-3, 3e-4];
+const DISTANCES: [f64; 5] = [1e-2, 3e-3, 1e-3, 3e-4, 1e-4];
+/// Largest distance of the new orbit from the old one in those distances, and largest change of its multipliers.
+const STRAYED: f64 = 3.0;
+const TURNED: f64 = 0.5;
 
 /// The first orbits of a new branch.
 #[derive(Clone, Debug)]
@@ -41,15 +44,16 @@ impl Cycles<'_> {
         }
     }
 
-    /// What the orbit sheds at an event of this kind; none where no new orbit is found.
+    /// What the orbit sheds at an event of this kind, to one side of it or, in the sense -1, to the other; none where no
+    /// new orbit is found.
     #[must_use]
-    pub fn shed(&self, orbit: &Orbit, kind: Kind) -> Option<Shed> {
+    pub fn shed(&self, orbit: &Orbit, kind: Kind, sense: f64) -> Option<Shed> {
         let of = self.shed_type(kind)?;
         let new = Cycles { of, ..*self };
         let at = self.at(&orbit.place);
         let place = new.place(&self.repeated(orbit, &new), at);
         let old = new.unfollowed(&place)?;
-        let direction = new.eigenvector(&old, 1.0)?;
+        let direction = new.eigenvector(&old, 1.0)? * sense;
         let count = direction.len();
         let row = direction.insert_row(count, 0.0);
         let first = DISTANCES.iter().find_map(|distance| {
@@ -58,8 +62,10 @@ impl Cycles<'_> {
             let side = |orbit: &Orbit, by: f64| (new.at(&orbit.place) - at) / (by * by);
             // Without the next term of the series.
             let side = (4.0 * side(&half, 0.5 * distance) - side(&far, *distance)) / 3.0;
-            let apart = |orbit: &Orbit, by: f64| (&orbit.place - &place).norm() < 3.0 * by;
-            apart(&far, *distance).then_some((far, side))
+            let near = (&far.place - &place).norm() < STRAYED * distance;
+            // Nothing has happened on the new branch yet.
+            let alike = (far.tests[1] - old.tests[1]).abs() < TURNED;
+            (near && alike).then_some((far, side))
         });
         let (far, side) = first?;
         Some(Shed { of, orbits: [Orbit { tangent: row, ..old }, far], side })

@@ -105,8 +105,7 @@ impl<const N: usize> Steps<N> {
 
 /// `(1 - exp(-x)) / x`.
 fn shrunk<const N: usize>(x: Tangent<f64, N>) -> Tangent<f64, N> {
-    series(x, |k| -1.0 / f64::from(k + 1))
-        .unwrap_or_else(|| (x.like(1.0) - (-x).exponential()) / x)
+    series(x, |k| -1.0 / f64::from(k + 1)).unwrap_or_else(|| (x.like(1.0) - (-x).exponential()) / x)
 }
 
 /// `-ln(1 - y) / y`.

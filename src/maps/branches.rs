@@ -4,7 +4,7 @@
 //! leaves. A branch is followed through each orbit that none passes through yet, until several sections in a row have
 //! had none. What a branch sheds is followed too.
 
-use super::control::{Control, pool};
+use super::control::Control;
 use super::orbits::{self, LONGEST, Request as Search};
 use super::starts::Axis;
 use crate::continuation::branch::Bounds;
@@ -77,7 +77,6 @@ pub fn branches(
         family.mirror();
         return Ok(Branches { family, sections });
     }
-    let pool = pool(request.threads)?;
     let mut quiet = 0;
     for k in 0..MOST {
         if k >= LEAST && quiet >= QUIET {
@@ -92,7 +91,7 @@ pub fn branches(
         let mut new = false;
         for orbit in &found {
             if !family.passes(orbit, at) {
-                new |= pool.install(|| family.add(orbit, at, control.flag()))?;
+                new |= family.add(orbit, at, control.flag())?;
             }
         }
         sections.push((at, found.len()));
