@@ -172,7 +172,7 @@ impl Cycles<'_> {
     #[must_use]
     pub fn coordinates(&self, place: &DVector<f64>) -> Vec<f64> {
         let first = place.len() - self.course.axes.len();
-        place.iter().skip(first).map(|x| x * self.scale).collect()
+        place.iter().skip(first).map(|x| self.origin + x * self.scale).collect()
     }
 
     /// The unit vector along the coordinate.

@@ -91,8 +91,8 @@ impl Plane {
     /// The orbits of one type at which this happens.
     #[must_use]
     pub fn critical(&self, of: Type, kind: Kind) -> Critical<'_> {
-        let cycles = Cycles { course: &self.course, of, symmetry: self.symmetry, scale: 1.0 };
-        Critical { cycles, kind }
+        let (course, symmetry) = (&self.course, self.symmetry);
+        Critical { cycles: Cycles { course, of, symmetry, origin: 0.0, scale: 1.0 }, kind }
     }
 
     /// The point of the curve through a seed, or through its mirror image; none if Newton's method does not find it.
