@@ -11,6 +11,7 @@ __all__ = [
     "Attractor",
     "BasinPlan",
     "Bifurcation",
+    "BifurcationSet",
     "Continuation",
     "CriticalAmplitudes",
     "Diverged",
@@ -34,6 +35,7 @@ __all__ = [
     "__version__",
     "acceleration",
     "advance",
+    "bifurcation_set",
     "bounds",
     "choose_steps",
     "continuation",
@@ -142,6 +144,24 @@ class Continuation:
     supercritical: _Places
     smooth: list[bool]
     sections: list[tuple[float, int]]
+
+@final
+class BifurcationSet:
+    kind: list[str]
+    n: _Places
+    w: _Places
+    symmetric: list[bool]
+    ends: list[tuple[str, str]]
+    meets: list[tuple[int, int]]
+    curve: _Places
+    at: _Floats
+    theta: _Floats
+    velocity: _Floats
+    multipliers: _Floats
+    supercritical: _Places
+    degenerate_kind: list[str]
+    degenerate_place: _Places
+    sections: list[tuple[int, float, int, int]]
 
 @final
 class Texture:
@@ -423,6 +443,13 @@ def continuation(
     threads: int,
     progress: _Progress | None = None,
 ) -> Continuation: ...
+def bifurcation_set(
+    model: Pendulum,
+    axes: tuple[tuple[Sequence[float], _Range], tuple[Sequence[float], _Range]],
+    longest: int,
+    threads: int,
+    progress: _Progress | None = None,
+) -> BifurcationSet: ...
 def orbits_near(
     model: Pendulum, steps: int, states: Sequence[tuple[float, float, int, bool | None]]
 ) -> list[tuple[int, list[_Pair]] | None]: ...

@@ -52,6 +52,8 @@ pub enum End {
     Crossing,
     /// The sequence of slips and sticks changes.
     Phases,
+    /// At the edge of the plane where nothing drives it.
+    Undriven,
     /// Newton's method fails at any step; with the norm of the derivative of a period.
     Lost(f64),
 }
@@ -69,6 +71,7 @@ impl End {
             Self::Fast => "velocity out of bounds",
             Self::Crossing => "branches cross",
             Self::Phases => "slips and sticks change",
+            Self::Undriven => "p = 0",
             Self::Lost(_) => "precision lost",
         }
     }

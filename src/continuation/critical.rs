@@ -13,9 +13,10 @@ use super::event::Kind;
 use super::period::{Image, Period};
 use crate::integrate::State;
 
-/// Newton's steps at most, the part of the step before that a step may have, and a step of rounding.
-const ITERATIONS: usize = 9;
-const CONTRACTION: f64 = 0.3;
+/// Newton's steps at most and the part of the step before that a step may have, from beside the curve and from afar; a
+/// step of rounding.
+const ITERATIONS: [usize; 2] = [9, 16];
+const CONTRACTION: [f64; 2] = [0.3, 0.9];
 const SETTLED: f64 = 1e-12;
 /// A gap of this many units of rounding is none.
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
@@ -81,7 +82,11 @@ impl Critical<'_> {
     /// The points of a place.
     #[must_use]
     pub fn points(&self, place: &DVector<f64>) -> Vec<State> {
-        if self.moving() == 0 { vec![[self.cycles.of.centre, 0.0]] } else { self.cycles.points(place) }
+        if self.moving() == 0 {
+            vec![[self.cycles.of.centre, 0.0]]
+        } else {
+            self.cycles.points(place)
+        }
     }
 
     /// The points of the whole orbit, angles not wrapped.
@@ -126,17 +131,29 @@ impl Critical<'_> {
         Some(Border([svd.u?.column(least).into(), svd.v_t?.row(least).transpose()]))
     }
 
-    /// The system at a place, the null vectors and the coefficient of the square.
-    fn system(&self, place: &DVector<f64>, border: Option<&Border>) -> Option<(System, Border, f64)> {
+    /// The system at a place, the null vectors and the coefficient of the square; with the border of a neighbour, and its
+    /// right null vector as the direction of second derivatives.
+    fn system(
+        &self,
+        place: &DVector<f64>,
+        border: Option<(&Border, &DVector<f64>)>,
+    ) -> Option<(System, Border, f64)> {
         let at = Self::at(place);
         let map = Period::<4>::new(self.cycles.course, &at);
         let points = self.points(place);
         let (count, moving, root) = (points.len(), self.moving(), self.cycles.root());
-        let images = self.images(&map, std::slice::from_ref(&points)).pop()?;
+        let laps = |along: &DVector<f64>| {
+            [BESIDE, -BESIDE].map(|by| Self::beside(&points, along, by / along.norm()))
+        };
+        // All at once where the direction is known: they share the drive.
+        let mut all = vec![points.clone()];
+        all.extend(border.into_iter().flat_map(|(_, along)| laps(along)));
+        let mut sides = self.images(&map, &all);
+        let images = sides.remove(0);
         let parts: Vec<Matrix2<f64>> = images.iter().map(|image| image.by_state).collect();
         let own;
         let border = match border {
-            Some(border) => border,
+            Some((border, _)) => border,
             None => {
                 own = self.border(&parts)?;
                 &own
@@ -145,8 +162,9 @@ impl Critical<'_> {
         let (weak, Border([b, c])) = (self.cycles.weak(&parts, self.multiplier()), border);
         let (right, g) = null_vector(&weak, b, c)?;
         let (left, _) = null_vector(&weak.transpose(), c, b)?;
-        let sides = [BESIDE, -BESIDE].map(|by| Self::beside(&points, &right, by / right.norm()));
-        let sides = self.images(&map, &sides);
+        if sides.is_empty() {
+            sides = self.images(&map, &laps(&right));
+        }
         let per_unit = right.norm() / (2.0 * BESIDE);
 
         let (shift, factors) = (self.cycles.closing().1, self.factors());
@@ -172,7 +190,8 @@ impl Critical<'_> {
                 let moved = if last && row == 0 { shift } else { 0.0 };
                 gap[2 * i + row] = factor * image.state[row] + moved - next[row];
                 for column in 0..2 {
-                    matrix[(2 * i + row, 2 * i + column)] += factor * root * image.by_state[(row, column)];
+                    matrix[(2 * i + row, 2 * i + column)] +=
+                        factor * root * image.by_state[(row, column)];
                 }
                 matrix[(2 * i + row, (2 * i + 2 + row) % moving)] -= root;
                 for k in 0..2 {
@@ -191,14 +210,21 @@ impl Critical<'_> {
     }
 
     /// The point of the curve near `guess` in the plane through it across `row`, by Newton's method; its tangent has the sense
-    /// of `row`. `border` is that of a neighbour; none at a guess that nearly closes with nearly the multiplier.
+    /// of `row`. `border` is that of a neighbour; none from afar.
     #[must_use]
-    pub fn near(&self, guess: &DVector<f64>, row: &DVector<f64>, border: Option<&Border>) -> Option<Point> {
+    pub fn near(
+        &self,
+        guess: &DVector<f64>,
+        row: &DVector<f64>,
+        border: Option<&Border>,
+    ) -> Option<Point> {
         let mut place = guess.clone();
         let mut before = f64::INFINITY;
         let mut kept = border.cloned();
-        for _ in 0..ITERATIONS {
-            let (system, vectors, bend) = self.system(&place, kept.as_ref())?;
+        let mut along = border.map(|Border([_, right])| right.clone());
+        let far = usize::from(border.is_none());
+        for _ in 0..ITERATIONS[far] {
+            let (system, vectors, bend) = self.system(&place, kept.as_ref().zip(along.as_ref()))?;
             let size = place.amax().max(1.0);
             let rounding = ROUNDING * (1.0 + system.norm) * size;
             let gap = system.gap.amax();
@@ -210,10 +236,12 @@ impl Critical<'_> {
             right[count] = row.dot(&(&place - guess));
             let step = bordered(&system.matrix, row).solve(&right)?;
             let length = step.norm();
-            let grows = length > CONTRACTION * before && length > SETTLED * size;
+            let grows = length > CONTRACTION[far] * before && length > SETTLED * size;
             if !length.is_finite() || grows {
                 return None;
             }
+            let Border([_, right]) = &vectors;
+            along = Some(right.clone());
             kept = kept.or(Some(vectors));
             before = length;
             place -= step;
@@ -268,7 +296,11 @@ impl Border {
 }
 
 /// The solution of `W v + b g = 0`, `c v = 1`.
-fn null_vector(weak: &DMatrix<f64>, b: &DVector<f64>, c: &DVector<f64>) -> Option<(DVector<f64>, f64)> {
+fn null_vector(
+    weak: &DMatrix<f64>,
+    b: &DVector<f64>,
+    c: &DVector<f64>,
+) -> Option<(DVector<f64>, f64)> {
     let count = weak.nrows();
     let mut whole = weak.clone().resize(count + 1, count + 1, 0.0);
     whole.view_mut((0, count), (count, 1)).copy_from(b);

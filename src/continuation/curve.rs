@@ -31,6 +31,8 @@ const CHANGE: [f64; 2] = [0.25, 2.0];
 /// Points of a curve at most, and the fastest motion of an orbit.
 const POINTS: usize = 5_000;
 const FASTEST: f64 = 1e3;
+/// An interpolated place between two points is this near to the curve, in parts of their distance.
+const CLOSE: f64 = 0.1;
 /// Refinements of a zero at most, and the part of a step at which it is known.
 const REFINEMENTS: usize = 40;
 const EXACT: f64 = 1e-14;
@@ -118,8 +120,10 @@ impl Critical<'_> {
                     length *= CHANGE[0];
                     continue;
                 };
-                self.add(&mut run, &here, last);
-                run.end = End::Range;
+                let coefficient = self.coefficient(&last, false);
+                let p = self.cycles.course.pendulum(&Self::at(&last.orbit.place)).drive.p;
+                self.add(&mut run, &here, Point { coefficient, ..last });
+                run.end = if p.abs() > f64::MIN_POSITIVE { End::Range } else { End::Undriven };
                 break;
             }
             let closes = run.points.len() > 2 && self.is_between(&first.orbit.place, &here, &next);
@@ -136,7 +140,12 @@ impl Critical<'_> {
 
     /// The next point with the part of the step that the following one may have; otherwise the part of it to try again.
     /// `refused` keeps why the last one was.
-    fn step(&self, points: &[Point], length: f64, refused: &mut Option<End>) -> Result<(Point, f64), f64> {
+    fn step(
+        &self,
+        points: &[Point],
+        length: f64,
+        refused: &mut Option<End>,
+    ) -> Result<(Point, f64), f64> {
         let here = &points[points.len() - 1];
         let mut guess = &here.orbit.place + &here.orbit.tangent * length;
         if let [.., before, _] = points {
@@ -163,16 +172,16 @@ impl Critical<'_> {
             *refused = Some(End::Crossing);
             return Err(CHANGE[0]);
         }
-        next.coefficient = self.coefficient(&next);
+        next.coefficient = self.coefficient(&next, false);
         Ok((next, (1.0 / worst).clamp(0.5, CHANGE[1])))
     }
 
-    /// The coefficient of the normal form; not a number where it is not known.
-    pub(super) fn coefficient(&self, point: &Point) -> f64 {
+    /// The coefficient of the normal form, precise or to some digits; not a number where it is not known.
+    pub(super) fn coefficient(&self, point: &Point, precise: bool) -> f64 {
         if self.kind == Kind::Fold {
             return point.coefficient;
         }
-        self.cubic(point).unwrap_or(f64::NAN)
+        self.cubic(point, precise).unwrap_or(f64::NAN)
     }
 
     /// What a curve of folds ends on between two points: orbits with half the period or more symmetry.
@@ -188,8 +197,8 @@ impl Critical<'_> {
         Some((end, Met { of, points, at: Self::at(&place) }))
     }
 
-    /// The point with this coordinate between two.
-    pub(super) fn between(&self, a: &Point, b: &Point, axis: usize, goal: f64) -> Option<Point> {
+    /// A place with this coordinate between two points, by Hermite's cubic.
+    fn guess(&self, a: &Point, b: &Point, axis: usize, goal: f64) -> Option<DVector<f64>> {
         let entry = a.orbit.place.len() - 2 + axis;
         let [low, high] = [a, b].map(|one| one.orbit.place[entry]);
         let part = (goal - low) / (high - low);
@@ -198,15 +207,19 @@ impl Critical<'_> {
         }
         let mut guess = self.cycles.interpolated(&a.orbit, &b.orbit, part);
         guess[entry] = goal;
+        Some(guess)
+    }
+
+    /// The point with this coordinate between two.
+    pub(super) fn between(&self, a: &Point, b: &Point, axis: usize, goal: f64) -> Option<Point> {
+        let guess = self.guess(a, b, axis, goal)?;
+        let entry = guess.len() - 2 + axis;
         let mut row = DVector::zeros(guess.len());
-        row[entry] = (high - low).signum();
+        row[entry] = (b.orbit.place[entry] - a.orbit.place[entry]).signum();
         let mut found = self.near(&guess, &row, Some(&a.border))?;
         found.orbit.place[entry] = goal;
         let strayed = found.orbit.moved > (&b.orbit.place - &a.orbit.place).norm();
-        (!strayed && found.orbit.tangent.dot(&a.orbit.tangent) > 0.0).then(|| {
-            found.coefficient = self.coefficient(&found);
-            found
-        })
+        (!strayed && found.orbit.tangent.dot(&a.orbit.tangent) > 0.0).then_some(found)
     }
 
     /// The point on the edge of the plane between two.
@@ -226,23 +239,29 @@ impl Critical<'_> {
     #[must_use]
     pub fn is_between(&self, place: &DVector<f64>, a: &Point, b: &Point) -> bool {
         let at = Self::at(place);
+        let near = CLOSE * (&b.orbit.place - &a.orbit.place).norm();
         [0, 1].into_iter().any(|axis| {
-            let found = self.between(a, b, axis, at[axis]);
-            found.is_some_and(|found| {
-                let own = Self::at(&found.orbit.place);
-                (own[1 - axis] - at[1 - axis]).abs() < SAME && self.is_same(&found.orbit.place, place)
-            })
+            let same = |found: &DVector<f64>, within: f64| {
+                let apart = Self::at(found)[1 - axis] - at[1 - axis];
+                apart.abs() < within && self.is_same(found, place, within)
+            };
+            self.guess(a, b, axis, at[axis]).is_some_and(|guess| same(&guess, near.max(SAME)))
+                && self
+                    .between(a, b, axis, at[axis])
+                    .is_some_and(|found| same(&found.orbit.place, SAME))
         })
     }
 
     /// Whether two places have the same orbit, or mirror images.
-    fn is_same(&self, a: &DVector<f64>, b: &DVector<f64>) -> bool {
+    fn is_same(&self, a: &DVector<f64>, b: &DVector<f64>, within: f64) -> bool {
         let angle = self.cycles.course.base.angle();
         let mirrored = self.cycles.symmetry == Some(Symmetry::AtOnce) && self.cycles.of.w == 0;
+        let within = within * self.cycles.root();
         let first = self.points(b)[0];
         let image = [-first[0], -first[1]];
         self.all_points(a).into_iter().any(|point| {
-            angle.distance(point, first) < SAME || mirrored && angle.distance(point, image) < SAME
+            let near = |state: State| angle.distance(point, state) < within;
+            near(first) || mirrored && near(image)
         })
     }
 
@@ -272,7 +291,7 @@ impl Critical<'_> {
             let part = (low * at_high - high * at_low) / (at_high - at_low);
             let guess = self.cycles.interpolated(&a.orbit, &b.orbit, part);
             let mut point = self.near(&guess, &a.orbit.tangent, Some(&a.border))?;
-            let value = self.coefficient(&point);
+            let value = self.coefficient(&point, true);
             point.coefficient = value;
             let side = usize::from(value.signum() != at_low.signum());
             let known = (part - ends[side].0).abs() < EXACT || high - low < EXACT;

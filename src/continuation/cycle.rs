@@ -62,10 +62,11 @@ pub struct Type {
 }
 
 impl Type {
-    /// Whether period, turns and closure are the same.
+    /// Whether period, turns and closure are the same, and of rest its side.
     #[must_use]
     pub fn is_like(&self, other: &Self) -> bool {
-        (self.n, self.w, self.closure) == (other.n, other.w, other.closure)
+        let side = self.closure != Closure::Rest || (self.centre - other.centre).cos() > 0.0;
+        side && (self.n, self.w, self.closure) == (other.n, other.w, other.closure)
     }
 }
 

@@ -6,7 +6,7 @@
 //! (Kuznetsov 2004, Elements of Applied Bifurcation Theory, section 5.4.2). About rest `B = 0`.
 //!
 //! `B` and `C` are the second and third derivatives of the map. They are differences of exact first derivatives on both
-//! sides, at three distances, without the first two terms of the error.
+//! sides: at three distances without the first two terms of the error, or at one where some digits do.
 
 use nalgebra::{DVector, Matrix2, Vector2};
 
@@ -37,36 +37,38 @@ impl Critical<'_> {
 
     /// The coefficient `w v c`; none where the sequence of phases changes nearby.
     #[must_use]
-    pub fn cubic(&self, point: &Point) -> Option<f64> {
-        (0..TIMES).find_map(|k| self.cubic_within(point, BESIDE * SHORTER.powi(k)))
+    pub fn cubic(&self, point: &Point, precise: bool) -> Option<f64> {
+        let weights: &[f64] = if precise { &WEIGHTS } else { &[1.0] };
+        (0..TIMES).find_map(|k| self.cubic_within(point, BESIDE * SHORTER.powi(k), weights))
     }
 
-    fn cubic_within(&self, point: &Point, distance: f64) -> Option<f64> {
+    fn cubic_within(&self, point: &Point, distance: f64, weights: &[f64]) -> Option<f64> {
         let place = &point.orbit.place;
         let [left, right] = point.border.vectors();
         let points = self.points(place);
         let map = Period::<4>::new(self.cycles.course, &Self::at(place));
-        let distances = [1.0, 2.0, 3.0].map(|times| times * distance);
-        let laps: Vec<_> = std::iter::once(0.0)
-            .chain(distances.into_iter().flat_map(|by| [by, -by]))
+        let by = |k: usize| distance * (k + 1) as f64;
+        let laps: Vec<_> = (0..weights.len())
+            .flat_map(|k| [by(k), -by(k)])
             .map(|by| Self::beside(&points, right, by))
             .collect();
         let images = self.images(&map, &laps);
-        let phases = |lap: &[Image]| lap.iter().map(|image| image.phases.clone()).collect::<Vec<_>>();
+        let phases =
+            |lap: &[Image]| lap.iter().map(|image| image.phases.clone()).collect::<Vec<_>>();
         let own = phases(&images[0]);
         if images.iter().any(|lap| phases(lap) != own) {
             return None;
         }
         // Of each part, the first derivatives' derivative along `v`, and the second one.
         let (factors, count) = (self.factors(), points.len());
-        let at = |lap: usize, i: usize| images[lap][i].by_state;
         let mut first = vec![Matrix2::zeros(); count];
         let mut second = vec![Matrix2::zeros(); count];
-        for (k, (by, weight)) in distances.into_iter().zip(WEIGHTS).enumerate() {
+        for (k, weight) in weights.iter().enumerate() {
             for i in 0..count {
-                let [above, below] = [at(2 * k + 1, i), at(2 * k + 2, i)];
-                first[i] += (above - below) * (weight * factors[i] / (2.0 * by));
-                second[i] += (above - at(0, i) * 2.0 + below) * (weight * factors[i] / (by * by));
+                let [above, below] = [2 * k, 2 * k + 1].map(|lap| images[lap][i].by_state);
+                let twice = point.orbit.parts[i] * 2.0;
+                first[i] += (above - below) * (weight * factors[i] / (2.0 * by(k)));
+                second[i] += (above - twice + below) * (weight * factors[i] / by(k).powi(2));
             }
         }
         let of = |vector: &DVector<f64>, i: usize| Vector2::new(vector[2 * i], vector[2 * i + 1]);

@@ -4,7 +4,7 @@ use std::sync::atomic::AtomicBool;
 
 use nalgebra::DVector;
 
-use super::branch::End;
+use super::branch::{End, SAME};
 use super::course::Course;
 use super::critical::{Critical, Point};
 use super::curve::{Degenerate, Met, Run};
@@ -95,20 +95,6 @@ impl Plane {
         Critical { cycles: Cycles { course, of, symmetry, origin: 0.0, scale: 1.0 }, kind }
     }
 
-    /// The point of the curve through a seed, or through its mirror image; none if Newton's method does not find it.
-    fn first(&self, seed: &Seed) -> Option<(Type, Point)> {
-        let (mut of, mut points) = (seed.of, seed.points.clone());
-        if of.w < 0 && self.symmetry == Some(Symmetry::AtOnce) {
-            of.w = -of.w;
-            points = points.into_iter().map(|[theta, velocity]| [-theta, -velocity]).collect();
-        }
-        let critical = self.critical(of, seed.kind);
-        let place = critical.place(&points, seed.at);
-        let mut row = DVector::zeros(place.len());
-        row[place.len() - 2 + seed.along] = 1.0;
-        Some((of, critical.near(&place, &row, None)?))
-    }
-
     /// Whether a curve passes through a place.
     fn passes(&self, of: Type, kind: Kind, place: &DVector<f64>) -> bool {
         let own = |curve: &&Curve| curve.kind == kind && curve.of.is_like(&of);
@@ -116,6 +102,14 @@ impl Plane {
             let critical = self.critical(curve.of, kind);
             curve.points.windows(2).any(|both| critical.is_between(place, &both[0], &both[1]))
         })
+    }
+
+    /// The points of a curve at which a coordinate, 0 or 1, has this value.
+    #[must_use]
+    pub fn points(&self, curve: &Curve, axis: usize, value: f64) -> Vec<Point> {
+        let critical = self.critical(curve.of, curve.kind);
+        let pairs = curve.points.windows(2);
+        pairs.filter_map(|both| critical.between(&both[0], &both[1], axis, value)).collect()
     }
 
     /// Adds the curve through a seed, if none passes there yet, and those that begin at its points of codimension 2; whether
@@ -136,12 +130,24 @@ impl Plane {
     }
 
     fn add_alone(&mut self, seed: &Seed, cancel: &AtomicBool) -> Result<(), Error> {
-        let Some((of, first)) = self.first(seed) else { return Ok(()) };
-        if self.passes(of, seed.kind, &first.orbit.place) {
-            return Ok(());
+        let (mut of, mut points) = (seed.of, seed.points.clone());
+        if of.w < 0 && self.symmetry == Some(Symmetry::AtOnce) {
+            // Its mirror image.
+            of.w = -of.w;
+            points = points.into_iter().map(|[theta, velocity]| [-theta, -velocity]).collect();
         }
         let critical = self.critical(of, seed.kind);
-        let first = Point { coefficient: critical.coefficient(&first), ..first };
+        let place = critical.place(&points, seed.at);
+        if self.passes(of, seed.kind, &place) {
+            return Ok(());
+        }
+        let mut row = DVector::zeros(place.len());
+        row[place.len() - 2 + seed.along] = 1.0;
+        let Some(first) = critical.near(&place, &row, None) else { return Ok(()) };
+        if first.orbit.moved > SAME && self.passes(of, seed.kind, &first.orbit.place) {
+            return Ok(());
+        }
+        let first = Point { coefficient: critical.coefficient(&first, false), ..first };
         let ahead = critical.followed(first.clone(), cancel)?;
         let mut curve = Curve::of(of, seed.kind, ahead);
         if curve.ends[1] == End::Closed {
@@ -163,7 +169,10 @@ impl Plane {
             let (of, kind) = (curve.of, curve.kind);
             let Some(met) = curve.near[end].clone() else { continue };
             let born = |kind: &Kind| {
-                self.critical(met.of, *kind).cycles.shed_type(*kind).is_some_and(|shed| shed.is_like(&of))
+                self.critical(met.of, *kind)
+                    .cycles
+                    .shed_type(*kind)
+                    .is_some_and(|shed| shed.is_like(&of))
             };
             let kinds = [Kind::PeriodDoubling, Kind::SymmetryBreaking];
             let Some(parent) = kinds.into_iter().find(born) else { continue };
@@ -191,8 +200,7 @@ impl Plane {
     fn nearest(&self, met: &Met, kind: Kind) -> Option<(usize, usize)> {
         let mut best: Option<(f64, (usize, usize))> = None;
         for (number, curve) in self.curves.iter().enumerate() {
-            let centred = met.of.closure != Closure::Rest || curve.of.centre == met.of.centre;
-            if curve.kind != kind || !curve.of.is_like(&met.of) || !centred {
+            if curve.kind != kind || !curve.of.is_like(&met.of) {
                 continue;
             }
             for (k, (_, index)) in curve.degenerate.iter().enumerate() {
@@ -212,7 +220,8 @@ impl Plane {
             let curve = &self.curves[index];
             let critical = self.critical(curve.of, curve.kind);
             let point = &curve.points[curve.degenerate[number].1];
-            let known = self.curves.iter().any(|other| other.meets.contains(&Some((index, number))));
+            let known =
+                self.curves.iter().any(|other| other.meets.contains(&Some((index, number))));
             let shed = critical.cycles.shed_type(curve.kind).filter(|of| of.n <= self.longest);
             let Some(of) = shed.filter(|_| !known) else { continue };
             let child = self.critical(of, Kind::Fold);
@@ -220,8 +229,16 @@ impl Plane {
             let row = &begin.orbit.tangent;
             let first = DISTANCES.iter().find_map(|away| {
                 let guess = &begin.orbit.place + row * *away;
-                child.near(&guess, row, Some(&begin.border))
+                child.near(&guess, row, None)
             });
+            if std::env::var("DEBUG").is_ok() {
+                eprintln!(
+                    "grow {:?} {:?} {}",
+                    curve.kind,
+                    Critical::at(&point.orbit.place),
+                    first.is_some()
+                );
+            }
             let Some(first) = first else { continue };
             if self.passes(of, Kind::Fold, &first.orbit.place) {
                 continue;

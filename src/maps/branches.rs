@@ -86,7 +86,12 @@ pub fn branches(
         let part = (0.5 + 0.618_033_988_749_895 * k as f64).fract();
         let at = bounds.low + part * (bounds.high - bounds.low);
         let pendulum = family.pendulum(at);
-        let window = window(&pendulum, (request.n, request.w), CELLS * request.n.min(FINER), request.threads)?;
+        let window = window(
+            &pendulum,
+            (request.n, request.w),
+            CELLS * request.n.min(FINER),
+            request.threads,
+        )?;
         let found = orbits::orbits(&pendulum, &window, control)?.closed;
         let mut new = false;
         for orbit in &found {

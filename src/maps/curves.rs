@@ -132,7 +132,8 @@ impl Curves {
         for branch in &family.branches[from..] {
             let cycles = family.cycles(branch.of);
             for event in branch.run.events.iter().filter(|event| event.smooth) {
-                if !matches!(event.kind, Kind::Fold | Kind::PeriodDoubling | Kind::SymmetryBreaking) {
+                if !matches!(event.kind, Kind::Fold | Kind::PeriodDoubling | Kind::SymmetryBreaking)
+                {
                     continue;
                 }
                 let orbit = &branch.run.orbits[event.orbit];

@@ -28,6 +28,7 @@ mod continuation;
 mod continued_plans;
 mod convergence_order;
 mod corners;
+mod curves;
 mod edge_cases;
 mod effects;
 mod effects_as_formulas;

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from pendmap import _core
-from pendmap.analysis import result, varied
+from pendmap.analysis import curves, result, varied
 from pendmap.analysis.result import Field, Schema, point, rows
 from pendmap.analysis.run import Numerics, RunOptions
 from pendmap.errors import (
@@ -44,6 +44,8 @@ _CRITICALITY: Final = {-1: "no meaning", 0: "subcritical", 1: "supercritical"}
 
 def _events(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the events for the JSON object."""
+    if "event_kind" not in dataset:
+        return []
     names = ("kind", "value", "theta", "velocity", "n", "w", "multipliers", "supercritical")
     more = ("branch", "smooth")
     entries = result.records(dataset, **{name: f"event_{name}" for name in (*names, *more)})
@@ -56,6 +58,8 @@ def _events(dataset: xr.Dataset) -> list[dict[str, Any]]:
 
 def _branches(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the branches for the JSON object."""
+    if "branch_n" not in dataset:
+        return []
     names = ("n", "w", "symmetric", "begin", "end", "first", "last", "low", "high", "twin")
     entries = result.records(dataset, **{name: f"branch_{name}" for name in names})
     for entry in entries:
@@ -72,6 +76,9 @@ SCHEMA = Schema(
     Field("varied", "", "parameter that varies"),
     Field("events", "", "folds, doublings and other events of the branches", read=_events),
     Field("branches", "", "branches of orbits", read=_branches),
+    Field("curves", "", "curves in the plane of two parameters", read=curves.entries),
+    Field("points", "", "points of codimension 2 on them", read=curves.points),
+    Field("up_to", "periods", "longest period of the orbits of curves"),
     Field("n", "periods", "smallest period of the orbits searched"),
     Field("w", "turns", "net turns over it"),
     Field("longest", "periods", "longest period of branches begun at doublings"),
@@ -94,10 +101,11 @@ def continuation(  # noqa: PLR0913 (physics first, numerical choices by name)
     *,
     start: tuple[float, float] | None = None,
     longest: int = 32,
+    up_to: int = 4,
     run: RunOptions | None = None,
     **options: Unpack[Keywords],
 ) -> xr.Dataset:
-    """Follow periodic orbits along one parameter: branches, and what happens on them.
+    """Follow periodic orbits along a parameter: branches, and what happens on them; or two.
 
     An orbit is a zero of ``P(x_i) - x_(i+1)`` over its points, ``P`` the stroboscopic map. Branches
     are followed by pseudo-arclength, around folds and where orbits are unstable. Orbits are
@@ -107,13 +115,19 @@ def continuation(  # noqa: PLR0913 (physics first, numerical choices by name)
     there are followed too, both twins of a symmetry breaking. Under dry friction so are the values
     at which a turn becomes a stick, the velocity touches 0, or friction holds the orbit for ever.
 
+    With two parameters: curves of folds, period doublings and symmetry breakings in their plane, of
+    all orbits up to some period and of both rests. Sections of the plane are searched in both
+    directions until several in a row have no event that no curve passes through. Points of
+    codimension 2 are located: cusps, and where a doubling or a symmetry breaking changes between
+    super- and subcritical, with the curves of folds that begin there.
+
     Parameters
     ----------
     pendulum : Pendulum or Rig
         The model; the parameter that varies replaces its own.
     ranges : mapping of str to (float, float) or array_like
-        One parameter and the ends of its range; several with arrays are a curve. Names are those
-        of :func:`pendmap.parameter_map`.
+        One parameter, or two, and the ends of their ranges; several with arrays are a curve. Names
+        are those of :func:`pendmap.parameter_map`.
     n : int
         Smallest period of the orbits, in forcing periods; 1 to 64.
     w : int
@@ -123,6 +137,8 @@ def continuation(  # noqa: PLR0913 (physics first, numerical choices by name)
         model's own value of the parameter; by default all orbits are searched.
     longest : int
         Longest period of the branches that are begun at doublings, in forcing periods.
+    up_to : int
+        With two parameters, the longest period of the orbits, in forcing periods; 1 to 16.
     run : RunOptions, optional
         As for :func:`pendmap.basins`.
 
@@ -138,6 +154,12 @@ def continuation(  # noqa: PLR0913 (physics first, numerical choices by name)
         over ``event``: ``event_kind``, ``event_value``, ``event_theta``, ``event_velocity``,
         ``event_n``, ``event_w``, ``event_multipliers``, ``event_supercritical``, ``event_smooth``,
         ``event_branch``, ``event_orbit``. Sections searched over ``section``.
+
+        Of two parameters, curves over ``curve``: ``curve_kind``, ``curve_n``, ``curve_w``,
+        ``curve_symmetric``, ``curve_begin``, ``curve_end``; their points over ``place``:
+        ``place_curve``, ``place_theta``, ``place_velocity``, ``place_multipliers``,
+        ``place_supercritical``, and ``place_p`` and others of the parameters; points of
+        codimension 2 over ``degenerate``: ``degenerate_kind``, ``degenerate_n`` and so on.
 
     Raises
     ------
@@ -158,6 +180,14 @@ def continuation(  # noqa: PLR0913 (physics first, numerical choices by name)
     (['period_doubling', 'fold'], array([1.34685852, 0.41678757]))
     """
     pendulum = varied.having(pendulum, ranges)
+    if isinstance(ranges, Mapping) and len(ranges) == 2 and _are_axes(ranges):  # noqa: PLR2004
+        axes = varied.varied(pendulum, _with_count(ranges), 2)
+        numerics = Numerics(RunOptions.of(run, options).in_memory("continuation"))
+        dataset, request = curves.in_plane(pendulum, axes, up_to, numerics)
+        known = numerics.provenance() | request
+        say, what = curves.summary, "curves are"
+        varied.complete(SCHEMA, dataset, pendulum, axes, known, summary=say, what=what)
+        return dataset
     (axis,) = varied.varied(pendulum, _with_count(ranges), 1)
     bare, units = without_dimensions(pendulum)
     n = check_whole("n", n, 1, LONGEST)
@@ -177,6 +207,11 @@ def continuation(  # noqa: PLR0913 (physics first, numerical choices by name)
     what = "orbits are"
     varied.complete(SCHEMA, dataset, pendulum, (axis,), values, summary=_summary, what=what)
     return dataset
+
+
+def _are_axes(ranges: Mapping[str, ArrayLike]) -> bool:
+    """Return whether each of the ranges is an axis: not those of one curve."""
+    return all(isinstance(values, tuple | Mapping) for values in ranges.values())
 
 
 def _with_count(ranges: Mapping[str, ArrayLike]) -> Mapping[str, ArrayLike]:
