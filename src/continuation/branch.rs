@@ -26,6 +26,8 @@ const MOVED: f64 = 0.08;
 const MOST: f64 = 2.5;
 /// Ratios of successive steps.
 const CHANGE: [f64; 2] = [0.25, 2.0];
+/// Steps over a place where branches cross.
+const ACROSS: [f64; 3] = [1e-4, 1e-3, 1e-2];
 /// Steps of a branch at most.
 const STEPS: usize = 20_000;
 /// Fastest motion of an orbit that is followed.
@@ -120,7 +122,7 @@ impl Cycles<'_> {
     /// [`Error::Interrupted`] if `cancel` is set.
     pub fn followed(
         &self,
-        first: Orbit,
+        first: &Orbit,
         bounds: Bounds,
         cancel: &AtomicBool,
     ) -> Result<(Run, End), Error> {
@@ -131,15 +133,10 @@ impl Cycles<'_> {
             unless_cancelled(cancel)?;
             let here = run.orbits[run.orbits.len() - 1].clone();
             if length < SHORTEST {
-                if refused == Some(End::Sticks) {
-                    transition::swallowed(&mut run);
+                if let Some(end) = self.stopped(&here, refused, &mut run) {
+                    return Ok((run, end));
                 }
-                let Some(after) = refused.is_none().then(|| self.turned_back(&here)).flatten()
-                else {
-                    return Ok((run, refused.unwrap_or(End::Lost(here.norm))));
-                };
-                transition::crossed(&mut run, &here, after);
-                length = FIRST;
+                (length, refused) = (FIRST, None);
                 continue;
             }
             match self.step(&here, length, &mut refused) {
@@ -152,7 +149,7 @@ impl Cycles<'_> {
                 }
                 Step::On(next, factor) => {
                     refused = None;
-                    let next = if next.phases == here.phases {
+                    let next = if next.is_like(&here) {
                         next
                     } else {
                         let Some([before, after]) = self.transition(&here, &next) else {
@@ -180,7 +177,7 @@ impl Cycles<'_> {
                         event::between(self, &here, &last, &mut run);
                         return Ok((run, End::Range));
                     }
-                    if run.orbits.len() > 2 && self.closes(&first, &here, &next) {
+                    if run.orbits.len() > 2 && self.closes(first, &here, &next) {
                         event::between(self, &here, &next, &mut run);
                         return Ok((run, End::Closed));
                     }
@@ -191,6 +188,31 @@ impl Cycles<'_> {
         }
         let norm = run.orbits.last().map_or(f64::NAN, |last| last.norm);
         Ok((run, End::Lost(norm)))
+    }
+
+    /// Goes on where no step from `here` does, or says why the branch ends; `refused` is why the last step was.
+    fn stopped(&self, here: &Orbit, refused: Option<End>, run: &mut Run) -> Option<End> {
+        match refused {
+            Some(End::Crossing) => {
+                let Some(after) = self.across(here) else { return refused };
+                run.orbits.push(after);
+            }
+            None => {
+                if let Some(after) = self.turned_back(here) {
+                    transition::crossed(run, here, after);
+                    return None;
+                }
+                let Some(last) = self.swallowed(here) else { return Some(End::Lost(here.norm)) };
+                run.orbits.push(last);
+                transition::swallowed(run);
+                return Some(End::Sticks);
+            }
+            _ => {
+                transition::swallowed(run);
+                return refused;
+            }
+        }
+        None
     }
 
     /// One step; `refused` keeps why the last one was.
@@ -205,7 +227,7 @@ impl Cycles<'_> {
         let change = (after - before).abs() / (2.0 + before.abs().min(after.abs()));
         let moved = next.moved / (MOVED * length);
         // At a change of phases the derivative jumps: the branch is followed up to there first.
-        let smooth = next.phases == here.phases;
+        let smooth = next.is_like(here);
         let worst = if smooth { moved.max(turn / TURN).max(change / TRACE) } else { moved };
         if worst > MOST {
             *refused = None;
@@ -228,25 +250,23 @@ impl Cycles<'_> {
         Step::On(Box::new(next), (1.0 / worst).clamp(0.5, CHANGE[1]))
     }
 
-    /// A part of the way between two orbits, by Hermite's cubic.
-    pub(super) fn interpolated(&self, a: &Orbit, b: &Orbit, part: f64) -> DVector<f64> {
-        let away = &b.place - &a.place;
-        let length = away.norm();
-        let rest = 1.0 - part;
-        // Where both are the same orbit the tangents say nothing.
-        &a.place
-            + &away * (part * part * (3.0 - 2.0 * part))
-            + &a.tangent * (length * part * rest * rest)
-            - &b.tangent * (length * part * part * rest)
+    /// An orbit on the other side of a place where branches cross, straight on.
+    fn across(&self, here: &Orbit) -> Option<Orbit> {
+        ACROSS.into_iter().find_map(|length| {
+            let next = self.near(&(&here.place + &here.tangent * length), &here.tangent)?;
+            let turn = here.tangent.dot(&next.tangent).clamp(-1.0, 1.0).acos();
+            (turn < TURN && next.moved < MOVED * length).then_some(next)
+        })
     }
 
     /// The orbit at a coordinate between two of the branch.
     pub(super) fn between(&self, a: &Orbit, b: &Orbit, at: f64) -> Option<Orbit> {
         let [low, high] = [a, b].map(|one| self.at(&one.place));
-        if low == high {
+        let width = high - low;
+        if width == 0.0 {
             return None;
         }
-        let mut guess = self.interpolated(a, b, (at - low) / (high - low));
+        let mut guess = interpolated(a, b, (at - low) / width);
         let last = guess.len() - 1;
         guess[last] = self.along_range(at);
         let mut row = self.along();
@@ -276,4 +296,15 @@ impl Cycles<'_> {
         let first = self.points(&a.place)[0];
         self.all_points(&b.place).iter().any(|point| angle.distance(*point, first) < SAME)
     }
+}
+
+/// A part of the way between two orbits, by Hermite's cubic.
+pub(super) fn interpolated(a: &Orbit, b: &Orbit, part: f64) -> DVector<f64> {
+    let away = &b.place - &a.place;
+    let length = away.norm();
+    let rest = 1.0 - part;
+    &a.place
+        + &away * (part * part * (3.0 - 2.0 * part))
+        + &a.tangent * (length * part * rest * rest)
+        - &b.tangent * (length * part * part * rest)
 }

@@ -254,7 +254,7 @@ impl Critical<'_> {
         let (system, border, coefficient) = self.system(place, None)?;
         let [_, right] = border.vectors();
         let tangent = right.clone().resize_vertically(place.len(), 0.0);
-        let orbit = self.cycles.finished(place.clone(), &system, tangent, 1.0, 0.0);
+        let orbit = self.cycles.finished(place.clone(), &system, tangent, true, 0.0);
         Some(Point { orbit, border, coefficient })
     }
 
@@ -272,7 +272,7 @@ impl Critical<'_> {
         let mut last = DVector::zeros(count + 1);
         last[count] = 1.0;
         let tangent = factors.solve(&last)?.normalize();
-        let orientation = factors.determinant().signum();
+        let orientation = factors.determinant() > 0.0;
         let moved = (&place - guess).norm();
         let orbit = self.cycles.finished(place, system, tangent, orientation, moved);
         Some(Point { orbit, border, coefficient: bend })

@@ -9,7 +9,7 @@ use std::sync::atomic::AtomicBool;
 
 use nalgebra::DVector;
 
-use super::branch::{End, SAME};
+use super::branch::{End, SAME, interpolated};
 use super::critical::{Critical, Point};
 use super::cycle::Type;
 use super::event::Kind;
@@ -190,7 +190,7 @@ impl Critical<'_> {
             return None;
         }
         let (of, _, part) = self.cycles.met_type(&here.orbit, &next.orbit)?;
-        let place = self.cycles.interpolated(&here.orbit, &next.orbit, part);
+        let place = interpolated(&here.orbit, &next.orbit, part);
         let rest = of.closure == super::cycle::Closure::Rest;
         let points = if rest { vec![[of.centre, 0.0]] } else { self.points(&place) };
         let end = if rest { End::Rest } else { End::Parent };
@@ -205,7 +205,7 @@ impl Critical<'_> {
         if !(0.0..=1.0).contains(&part) {
             return None;
         }
-        let mut guess = self.cycles.interpolated(&a.orbit, &b.orbit, part);
+        let mut guess = interpolated(&a.orbit, &b.orbit, part);
         guess[entry] = goal;
         Some(guess)
     }
@@ -289,7 +289,7 @@ impl Critical<'_> {
         for _ in 0..REFINEMENTS {
             let [(low, at_low), (high, at_high)] = ends;
             let part = (low * at_high - high * at_low) / (at_high - at_low);
-            let guess = self.cycles.interpolated(&a.orbit, &b.orbit, part);
+            let guess = interpolated(&a.orbit, &b.orbit, part);
             let mut point = self.near(&guess, &a.orbit.tangent, Some(&a.border))?;
             let value = self.coefficient(&point, true);
             point.coefficient = value;

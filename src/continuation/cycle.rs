@@ -32,6 +32,8 @@ const ITERATIONS: usize = 8;
 const CONTRACTION: f64 = 0.3;
 /// A gap of this many units of rounding is none.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
+/// Within this many times as much steps that do not shrink are those of rounding.
+const NOISE: f64 = 100.0;
 /// A step below this is one of rounding.
 const SETTLED: f64 = 1e-13;
 /// Under friction a velocity below this is 0.
@@ -93,8 +95,9 @@ pub struct Orbit {
     pub place: DVector<f64>,
     /// Unit vector along the branch.
     pub tangent: DVector<f64>,
-    /// Sign of the determinant of the system bordered by the tangent: one along a branch without a branching point.
-    pub orientation: f64,
+    /// Whether the determinant of the system bordered by the tangent is positive: it keeps its sign along a branch without a
+    /// branching point.
+    pub orientation: bool,
     /// `det(M - 1)` and `det(M + 1)` of the derivative `M` of the map that closes.
     pub tests: [f64; 2],
     /// The determinant of `M`, and whether it follows from a law.
@@ -103,12 +106,22 @@ pub struct Orbit {
     pub parts: Vec<Matrix2<f64>>,
     /// Phases under friction, see [`round`].
     pub phases: Vec<Phase>,
+    /// The phase at each of its points: where it changes, so does the derivative by the points.
+    pub section: Vec<Phase>,
     /// Whether friction holds it for ever.
     pub stuck: bool,
     /// Distance from where Newton's method began.
     pub moved: f64,
     /// Largest norm of a derivative.
     pub norm: f64,
+}
+
+impl Orbit {
+    /// Whether the map is smooth from this orbit to the other: slips and sticks are the same.
+    #[must_use]
+    pub fn is_like(&self, other: &Self) -> bool {
+        self.phases == other.phases && self.section == other.section
+    }
 }
 
 /// The system at one place.
@@ -246,16 +259,18 @@ impl Cycles<'_> {
             let size = place.amax().max(1.0);
             let rounding = ROUNDING * (1.0 + system.norm) * size;
             let gap = system.gap.amax();
-            if gap <= rounding || (before < SETTLED * size && gap < rounding.sqrt()) {
-                let moved = (&place - guess).norm();
-                return self.complete(place, &system, row, moved);
-            }
             let count = system.gap.len();
             let mut right = system.gap.clone().insert_row(count, 0.0);
             right[count] = row.dot(&(&place - guess));
             let step = bordered(&system.matrix, row).solve(&right)?;
             let length = step.norm();
-            if !length.is_finite() || length > CONTRACTION * before && length > SETTLED * size {
+            // At the level of rounding steps no longer shrink.
+            let stalls = gap <= NOISE * rounding && length > CONTRACTION * before;
+            if gap <= rounding || stalls || before < SETTLED * size {
+                let moved = (&place - guess).norm();
+                return self.complete(place, &system, row, moved);
+            }
+            if !length.is_finite() || length > CONTRACTION * before {
                 return None;
             }
             before = length;
@@ -273,7 +288,7 @@ impl Cycles<'_> {
     #[must_use]
     pub fn unfollowed(&self, place: &DVector<f64>) -> Option<Orbit> {
         let system = self.system(place)?;
-        Some(self.finished(place.clone(), &system, self.along(), 1.0, 0.0))
+        Some(self.finished(place.clone(), &system, self.along(), true, 0.0))
     }
 
     fn complete(
@@ -285,13 +300,13 @@ impl Cycles<'_> {
     ) -> Option<Orbit> {
         let count = system.gap.len();
         let (tangent, orientation) = if self.of.closure == Closure::Rest {
-            (row.clone(), row[count].signum())
+            (row.clone(), row[count] > 0.0)
         } else {
             let factors = bordered(&system.matrix, row);
             let mut last = DVector::zeros(count + 1);
             last[count] = 1.0;
             let tangent = factors.solve(&last)?.normalize();
-            (tangent, factors.determinant().signum())
+            (tangent, factors.determinant() > 0.0)
         };
         Some(self.finished(place, system, tangent, orientation, moved))
     }
@@ -301,7 +316,7 @@ impl Cycles<'_> {
         place: DVector<f64>,
         system: &System,
         tangent: DVector<f64>,
-        orientation: f64,
+        orientation: bool,
         moved: f64,
     ) -> Orbit {
         let parts: Vec<Matrix2<f64>> = system.images.iter().map(|image| image.by_state).collect();
@@ -316,10 +331,24 @@ impl Cycles<'_> {
             }
             _ => round(phases),
         };
+        let section =
+            system.images.iter().filter_map(|image| image.phases.first().copied()).collect();
         let stuck = system.images.iter().any(|image| image.held[1]);
         let product = law.map_or((own, false), |law| (law, true));
         let norm = system.norm;
-        Orbit { place, tangent, orientation, tests, product, parts, phases, stuck, moved, norm }
+        Orbit {
+            place,
+            tangent,
+            orientation,
+            tests,
+            product,
+            parts,
+            phases,
+            section,
+            stuck,
+            moved,
+            norm,
+        }
     }
 
     /// The matrix whose determinant is `det(M - m)` and whose kernel holds the eigenvector at each point, if `m` is

@@ -4,7 +4,7 @@
 //! `det(M - 1)`, and the product of a complex pair less 1. They pass 0 simply, and are evaluated on orbits of the branch
 //! from exact first derivatives, so that the secant method finds their zeros to rounding.
 
-use super::branch::Run;
+use super::branch::{Run, interpolated};
 use super::cycle::{Closure, Cycles, Orbit};
 
 /// Refinements of a zero at most, and the part of a step at which it is known.
@@ -81,9 +81,9 @@ fn circle(_: &Cycles<'_>, orbit: &Orbit) -> f64 {
     1.0 - orbit.product.0
 }
 
-/// Adds what happens between the last orbit of the run, `here`, and `next`, and `next` itself.
-pub(super) fn between(cycles: &Cycles<'_>, here: &Orbit, next: &Orbit, run: &mut Run) {
-    let tests: &[(Kind, Test)] = match cycles.of.closure {
+/// The test functions of orbits that close in this way.
+fn tests(closure: Closure) -> &'static [(Kind, Test)] {
+    match closure {
         Closure::Whole => {
             &[(Kind::Fold, fold), (Kind::PeriodDoubling, minus), (Kind::NeimarkSacker, circle)]
         }
@@ -95,9 +95,68 @@ pub(super) fn between(cycles: &Cycles<'_>, here: &Orbit, next: &Orbit, run: &mut
             (Kind::PeriodDoubling, minus),
             (Kind::NeimarkSacker, circle),
         ],
-    };
+    }
+}
+
+/// Adds what happens between the last orbit of the run, `here`, and `next`, and `next` itself.
+pub(super) fn between(cycles: &Cycles<'_>, here: &Orbit, next: &Orbit, run: &mut Run) {
+    match touched(cycles, run, next) {
+        Some((true, middle)) => {
+            passed(cycles, here, &middle, run);
+            passed(cycles, &middle, next, run);
+        }
+        Some((false, middle)) => {
+            let here = run.orbits.pop();
+            if let (Some(here), Some(before)) = (here, run.orbits.last().cloned()) {
+                passed(cycles, &before, &middle, run);
+                passed(cycles, &middle, &here, run);
+                passed(cycles, &here, next, run);
+            }
+        }
+        None => passed(cycles, here, next, run),
+    }
+}
+
+/// An orbit on the other side of a zero that a test seems to pass twice, by the parabola through its values at the last
+/// two orbits of the run and at `next`; and whether it is after the last one.
+fn touched(cycles: &Cycles<'_>, run: &Run, next: &Orbit) -> Option<(bool, Orbit)> {
+    let count = run.orbits.len();
+    let [before, here] = [run.orbits.get(count.checked_sub(2)?)?, run.orbits.last()?];
+    let smooth = before.is_like(here) && here.is_like(next);
+    let event = run.events.last().is_some_and(|event| event.orbit + 2 >= count);
+    if !smooth || event || before.orientation != next.orientation {
+        return None;
+    }
+    let [back, on] = [(here, before), (next, here)].map(|(a, b)| (&a.place - &b.place).norm());
+    tests(cycles.of.closure).iter().find_map(|(_, test)| {
+        let sign = test(cycles, here).signum();
+        let [first, middle, last] = [before, here, next].map(|orbit| sign * test(cycles, orbit));
+        if !(middle < first && middle < last) || back == 0.0 || on == 0.0 {
+            return None;
+        }
+        let slopes = [(middle - first) / back, (last - middle) / on];
+        let bend = (slopes[1] - slopes[0]) / (back + on);
+        let slope = slopes[0] + bend * back;
+        let place = -0.5 * slope / bend;
+        if middle + 0.5 * slope * place > 0.5 * middle {
+            return None;
+        }
+        let after = place > 0.0;
+        let guess = if after {
+            interpolated(here, next, place / on)
+        } else {
+            interpolated(before, here, 1.0 + place / back)
+        };
+        let row = if after { &here.tangent } else { &before.tangent };
+        let found = cycles.near(&guess, row)?;
+        (sign * test(cycles, &found) < 0.0).then_some((after, found))
+    })
+}
+
+/// [`between`] where no test passes 0 twice.
+fn passed(cycles: &Cycles<'_>, here: &Orbit, next: &Orbit, run: &mut Run) {
     let mut found: Vec<(f64, Kind, Orbit, f64)> = Vec::new();
-    for (kind, test) in tests {
+    for (kind, test) in tests(cycles.of.closure) {
         let values = [here, next].map(|one| test(cycles, one));
         let complex = |one: &Orbit| one.tests[0] > 0.0 && one.tests[1] > 0.0;
         let passes = values[0] * values[1] <= 0.0 && values[1] != 0.0;
@@ -131,7 +190,8 @@ fn zero(cycles: &Cycles<'_>, a: &Orbit, b: &Orbit, test: Test) -> Option<Orbit> 
         }
         let part = (low * at_high - high * at_low) / (at_high - at_low);
         let part = if part > low && part < high { part } else { 0.5 * (low + high) };
-        let orbit = cycles.near(&cycles.interpolated(a, b, part), &a.tangent)?;
+        let at = |part: f64| Some((part, cycles.near(&interpolated(a, b, part), &a.tangent)?));
+        let (part, orbit) = at(part).or_else(|| at(0.5 * (low + high)))?;
         let value = test(cycles, &orbit);
         let side = usize::from(value.signum() != at_low.signum());
         let known = (part - ends[side].0).abs() < EXACT;

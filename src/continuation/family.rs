@@ -174,6 +174,8 @@ impl Family {
                 let both =
                     kind == Kind::SymmetryBreaking && self.symmetry != Some(Symmetry::AtOnce);
                 let senses: &[f64] = if both { &[1.0, -1.0] } else { &[1.0] };
+                let rest = branch.of.closure == Closure::Rest;
+                let begin = if rest { End::Rest } else { End::Parent };
                 let mut side = None;
                 let mut new = Vec::new();
                 for sense in senses {
@@ -181,7 +183,7 @@ impl Family {
                     side = Some(shed.side);
                     if self.end_at(of, &place.0, place.1).is_none() && of.n <= self.longest {
                         let cycles = self.cycles(of);
-                        new.push(cycles.from_parent(&shed.orbits, self.bounds, cancel)?);
+                        new.push(cycles.begun_at(&shed.orbits, begin, self.bounds, cancel)?);
                     }
                 }
                 while let Some((branch, end)) = self.end_at(of, &place.0, place.1) {
@@ -273,22 +275,21 @@ impl Cycles<'_> {
         bounds: Bounds,
         cancel: &AtomicBool,
     ) -> Result<Branch, Error> {
-        let none = (None, [None; 2]);
-        let (ahead, end) = self.followed(first.clone(), bounds, cancel)?;
+        let branch = |run, ends| Branch { of: self.of, run, ends, meets: [None; 2], twin: None };
+        let (ahead, end) = self.followed(&first, bounds, cancel)?;
         if end == End::Closed {
-            let ends = [End::Closed; 2];
-            return Ok(Branch { of: self.of, run: ahead, ends, meets: none.1, twin: none.0 });
+            return Ok(branch(ahead, [End::Closed; 2]));
         }
-        let turned = Orbit { tangent: -&first.tangent, orientation: -first.orientation, ..first };
-        let (back, begin) = self.followed(turned, bounds, cancel)?;
-        let run = back.reversed().joined(ahead);
-        Ok(Branch { of: self.of, run, ends: [begin, end], meets: none.1, twin: none.0 })
+        let turned = Orbit { tangent: -&first.tangent, orientation: !first.orientation, ..first };
+        let (back, begin) = self.followed(&turned, bounds, cancel)?;
+        Ok(branch(back.reversed().joined(ahead), [begin, end]))
     }
 
     /// The branch that begins at an orbit shed by another one.
-    fn from_parent(
+    fn begun_at(
         &self,
         [old, first]: &[Orbit; 2],
+        begin: End,
         bounds: Bounds,
         cancel: &AtomicBool,
     ) -> Result<Branch, Error> {
@@ -296,14 +297,12 @@ impl Cycles<'_> {
         let (mut run, end) = if beyond {
             (Run { orbits: vec![first.clone()], events: Vec::new() }, End::Range)
         } else {
-            self.followed(first.clone(), bounds, cancel)?
+            self.followed(first, bounds, cancel)?
         };
         run.orbits.insert(0, old.clone());
         for event in &mut run.events {
             event.orbit += 1;
         }
-        let rest = self.of.closure == Closure::Half || self.of.n == 1;
-        let begin = if rest { End::Rest } else { End::Parent };
         Ok(Branch { of: self.of, run, ends: [begin, end], meets: [None; 2], twin: None })
     }
 }
@@ -316,7 +315,7 @@ impl Run {
         let last = self.orbits.len() - 1;
         for orbit in &mut self.orbits {
             orbit.tangent.neg_mut();
-            orbit.orientation = -orbit.orientation;
+            orbit.orientation = !orbit.orientation;
         }
         for event in &mut self.events {
             event.orbit = last - event.orbit;

@@ -7,7 +7,7 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::Vector2;
 
-use super::branch::End;
+use super::branch::{End, interpolated};
 use super::cycle::{Closure, Cycles, Orbit, Type};
 use super::period::Period;
 use crate::integrate::State;
@@ -74,7 +74,7 @@ impl Cycles<'_> {
     /// The end of the branch between two orbits on one with more symmetry, and the orbit there.
     pub(super) fn meeting(&self, here: &Orbit, next: &Orbit) -> Option<(End, Orbit)> {
         let (of, test, part) = self.met_type(here, next)?;
-        let between = self.interpolated(here, next, part);
+        let between = interpolated(here, next, part);
         let place = self.met((of, test), &between).unwrap_or(between);
         let last = self.unfollowed(&place)?;
         let end = if of.closure == Closure::Rest { End::Rest } else { End::Parent };

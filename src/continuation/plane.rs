@@ -155,7 +155,7 @@ impl Plane {
         } else {
             let mut turned = first;
             turned.orbit.tangent.neg_mut();
-            turned.orbit.orientation = -turned.orbit.orientation;
+            turned.orbit.orientation = !turned.orbit.orientation;
             curve.begins(critical.followed(turned, cancel)?);
         }
         self.curves.push(curve);
@@ -231,14 +231,6 @@ impl Plane {
                 let guess = &begin.orbit.place + row * *away;
                 child.near(&guess, row, None)
             });
-            if std::env::var("DEBUG").is_ok() {
-                eprintln!(
-                    "grow {:?} {:?} {}",
-                    curve.kind,
-                    Critical::at(&point.orbit.place),
-                    first.is_some()
-                );
-            }
             let Some(first) = first else { continue };
             if self.passes(of, Kind::Fold, &first.orbit.place) {
                 continue;
@@ -275,7 +267,7 @@ impl Curve {
         self.degenerate.sort_by_key(|(_, index)| *index);
         let turned = run.points.into_iter().skip(1).map(|mut point| {
             point.orbit.tangent.neg_mut();
-            point.orbit.orientation = -point.orbit.orientation;
+            point.orbit.orientation = !point.orbit.orientation;
             point
         });
         let mut points: Vec<Point> = turned.collect();

@@ -34,23 +34,37 @@ impl Cycles<'_> {
             if orbit.moved > apart {
                 return None;
             }
-            if orbit.phases == here.phases { before = orbit } else { after = orbit }
+            if orbit.is_like(here) { before = orbit } else { after = orbit }
         }
         let neighbours = (&after.place - &before.place).norm() < NEIGHBOURS;
         neighbours.then_some([before, after])
+    }
+
+    /// The last orbit before friction holds the pendulum for ever, straight on from one so near that no step is possible: the
+    /// motion between its sticks fades there.
+    pub(super) fn swallowed(&self, here: &Orbit) -> Option<Orbit> {
+        let ahead = |away: f64| self.open(&(&here.place + &here.tangent * away), &here.tangent);
+        let held = |away: f64| ahead(away).is_some_and(|orbit| orbit.stuck);
+        let mut beyond = BEYOND.into_iter().find(|away| held(*away))?;
+        let mut before = 0.0;
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (before + beyond);
+            if held(middle) { beyond = middle } else { before = middle }
+        }
+        ahead(before)
     }
 
     /// The first orbit with other phases where no orbit lies ahead of the last one: the branch turns back.
     pub(super) fn turned_back(&self, here: &Orbit) -> Option<Orbit> {
         BEYOND.into_iter().find_map(|away| {
             let ahead = self.open(&(&here.place + &here.tangent * away), &here.tangent)?;
-            if ahead.phases == here.phases {
+            if ahead.is_like(here) {
                 return None;
             }
             [1.0, -1.0].into_iter().find_map(|sense| {
                 let row = &ahead.tangent * sense;
                 let found = self.near(&(&here.place + &row * away), &row)?;
-                let on = found.phases != here.phases && !found.stuck;
+                let on = !found.is_like(here) && !found.stuck;
                 (on && found.moved < MOVED * away).then_some(found)
             })
         })
@@ -60,7 +74,7 @@ impl Cycles<'_> {
 /// Adds two orbits between which the phases change, and what happens there.
 pub(super) fn crossed(run: &mut Run, before: &Orbit, after: Orbit) {
     let orbit = run.orbits.len() - 1;
-    let mut kinds = vec![kind(&before.phases, &after.phases)];
+    let mut kinds: Vec<Kind> = kind(&before.phases, &after.phases).into_iter().collect();
     let last = before.tangent.len() - 1;
     if before.tangent[last] * after.tangent[last] < 0.0 {
         kinds.push(Kind::Fold);
@@ -74,19 +88,23 @@ pub(super) fn crossed(run: &mut Run, before: &Orbit, after: Orbit) {
     run.orbits.push(after);
 }
 
-/// Marks the last orbit as one beyond which friction holds the pendulum for ever.
+/// Marks the last orbit of a run as one beyond which friction holds the pendulum for ever.
 pub(super) fn swallowed(run: &mut Run) {
     let orbit = run.orbits.len() - 1;
     let (kind, supercritical) = (Kind::RestBoundary, None);
     run.events.push(Event { kind, orbit, rises: 1.0, supercritical, smooth: false });
 }
 
-/// What the change is: a stick between opposite senses comes or goes, or the velocity touches 0.
-fn kind(before: &[Phase], after: &[Phase]) -> Kind {
+/// What the change is: a stick between opposite senses comes or goes, or the velocity touches 0; nothing where a turn or
+/// a release only passes the section.
+fn kind(before: &[Phase], after: &[Phase]) -> Option<Kind> {
+    if before == after {
+        return None;
+    }
     let opposite = |phases: &[Phase]| {
         let count = phases.len();
         let sticks = (0..count).filter(|k| phases[*k] == Phase::Stick);
         sticks.filter(|k| phases[(k + count - 1) % count] != phases[(k + 1) % count]).count()
     };
-    if opposite(before) == opposite(after) { Kind::Grazing } else { Kind::StickOnset }
+    Some(if opposite(before) == opposite(after) { Kind::Grazing } else { Kind::StickOnset })
 }

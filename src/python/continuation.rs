@@ -48,6 +48,7 @@ pub struct Continuation {
 /// values at places in the range, whose ends are the first and the last place. With `start`, an angle, a velocity and a
 /// coordinate, the one branch through the orbit that Newton's method finds from there.
 #[pyfunction]
+#[allow(clippy::too_many_arguments)] // what Python passes, and the interpreter
 #[pyo3(signature = (model, along, winding, longest, start, threads, progress=None))]
 pub fn continuation(
     py: Python<'_>,

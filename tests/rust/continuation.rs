@@ -4,10 +4,13 @@ use std::sync::atomic::AtomicBool;
 
 use pendmap::continuation::branch::{Bounds, End};
 use pendmap::continuation::course::{Course, Law};
+use pendmap::continuation::cycle::{Closure, Orbit};
 use pendmap::continuation::event::Kind as Happens;
 use pendmap::continuation::family::{Branch, Family};
 use pendmap::continuation::period::Period;
 use pendmap::error::Error;
+use pendmap::integrate::reference::event::EventKind;
+use pendmap::integrate::trajectory::{Request as Trajectory, simulate};
 use pendmap::maps::branches::{Branches, Request, branches};
 use pendmap::maps::control::Control;
 use pendmap::maps::tongues::{Balance, tongues};
@@ -20,12 +23,12 @@ use crate::support::driven;
 
 /// All branches of `n:w` in a range of `p`.
 fn along_p(base: &Pendulum, range: [f64; 2], winding: (usize, i64), longest: usize) -> Branches {
-    along(Course::of(base, Parameter::P), range, winding, longest)
+    along(&Course::of(base, Parameter::P), range, winding, longest)
 }
 
-fn along(course: Course, [low, high]: [f64; 2], (n, w): (usize, i64), longest: usize) -> Branches {
+fn along(course: &Course, [low, high]: [f64; 2], (n, w): (usize, i64), longest: usize) -> Branches {
     let request = Request { n, w, longest, start: None, threads: 0 };
-    branches(&course, Bounds { low, high }, &request, &Control::default()).expect("branches")
+    branches(course, Bounds { low, high }, &request, &Control::default()).expect("branches")
 }
 
 /// Places of the events of a kind on branches of period `n`, twins left out.
@@ -122,6 +125,62 @@ fn friction_moves_folds_and_symmetry_breakings() {
 }
 
 #[test]
+fn sticks_and_grazings_are_where_motions_have_them() {
+    let base = driven(0.05, 1.0, 1.0).with_friction(0.4).expect("in range");
+    let found = along_p(&base, [1.0, 3.0], (1, 1), 1);
+    let family = &found.family;
+    let mut checked = 0;
+    for branch in &family.branches {
+        let cycles = family.cycles(branch.of);
+        for event in branch.run.events.iter().filter(|event| !event.smooth) {
+            let orbit = &branch.run.orbits[event.orbit];
+            let at = cycles.at(&orbit.place);
+            // Turns and sticks of the orbit on either side, as a trajectory has them.
+            let counts = [-1e-6, 1e-6].map(|by| {
+                let near = branch.at(&cycles, at + by);
+                let point = cycles.points(&orbit.place)[0];
+                let away = |one: &Orbit| (cycles.points(&one.place)[0][0] - point[0]).abs();
+                let closest = near.iter().min_by(|a, b| away(a).total_cmp(&away(b))).expect("one");
+                let start = cycles.points(&closest.place)[0];
+                let pendulum = family.pendulum(at + by);
+                let until = pendulum.period();
+                let asked = Trajectory { start, until, tol: 1e-12, samples: 16, lyapunov: false };
+                let run = simulate(&pendulum, &asked, &AtomicBool::new(false)).expect("a motion");
+                let of = |kind| run.events.iter().filter(|event| event.kind == kind).count();
+                [of(EventKind::Turn), of(EventKind::Stick)]
+            });
+            assert_ne!(counts[0], counts[1], "{:?} at {at}", event.kind);
+            checked += 1;
+        }
+    }
+    assert!(checked >= 4, "{checked} changes of slips and sticks");
+    assert_near(&events(&found, 1, Happens::Grazing)[..1], &[1.86155707819], 1e-9);
+}
+
+#[test]
+fn rest_swallows_a_stick_slip_motion() {
+    // A push of amplitude k moves the pendulum from 0 only above the friction.
+    let spec = formula("push", "k*cos(phase)", &[("k", 2.0)]);
+    let push = Effect::new(Kind::Formula(Formula::new(&spec).expect("a formula")), &[0.6]);
+    let base = Pendulum::new(0.3, 0.0, 0.5, 0.0, 0.0).expect("in range").with_friction(0.3);
+    let base = base.expect("in range").with_effect(push.expect("in range")).expect("once");
+    let course = Course::of(&base, base.parameter("push.k").expect("there"));
+    // The motion that attracts from rest.
+    let until = 12.0 * base.period();
+    let asked = Trajectory { start: [0.0; 2], until, tol: 1e-10, samples: 16, lyapunov: false };
+    let run = simulate(&base, &asked, &AtomicBool::new(false)).expect("a motion");
+    let last = run.theta.len() - 1;
+    let start = Some(([run.theta[last], run.velocity[last]], 0.6));
+    let request = Request { n: 1, w: 0, longest: 1, start, threads: 1 };
+    let bounds = Bounds { low: 0.2, high: 0.7 };
+    let found = branches(&course, bounds, &request, &Control::default()).expect("a branch");
+    assert!(found.family.branches[0].ends.contains(&End::Sticks));
+    let at = events(&found, 1, Happens::RestBoundary);
+    // The push exceeds the friction from there on.
+    assert_near(&at, &[0.3], 1e-10);
+}
+
+#[test]
 fn doublings_accumulate_by_feigenbaums_ratio() {
     let found = along_p(&driven(0.1, 1.0, 2.0), [1.3, 1.85], (1, 1), 32);
     let at: Vec<f64> = [1, 2, 4, 8, 16, 32]
@@ -143,8 +202,7 @@ fn branches_of_rest_change_where_floquets_theory_says() {
         let level = tongues(&base, balance, &[2.0], 6.0, false, 1, &Control::default());
         let critical: Vec<f64> = level.expect("rest")[0].critical.iter().map(|c| c.p).collect();
         let own = found.family.branches.iter().find(|branch| {
-            branch.of.closure == pendmap::continuation::cycle::Closure::Rest
-                && (branch.of.centre.abs() - centre).abs() < 1.0
+            branch.of.closure == Closure::Rest && (branch.of.centre.abs() - centre).abs() < 1.0
         });
         let own = own.expect("rest is an orbit");
         let mut at: Vec<f64> = [Happens::SymmetryBreaking, Happens::PeriodDoubling]
@@ -239,6 +297,21 @@ fn a_torque_opens_the_pitchfork_and_no_step_jumps_across() {
 }
 
 #[test]
+fn rotations_along_a_torque_close_on_themselves() {
+    let found =
+        along(&Course::of(&driven(0.1, 0.6, 2.0), Parameter::Torque), [-1.5, 2.0], (1, 1), 1);
+    let branch = &found.family.branches[0];
+    assert_eq!(found.family.branches.len(), 1);
+    assert_eq!(branch.ends, [End::Closed; 2]);
+    let folds = events(&found, 1, Happens::Fold);
+    assert_eq!(folds.len(), 2, "locked between two torques: {folds:?}");
+    // No orbit turns with the drive beyond them.
+    for at in [folds[0] - 1e-3, folds[1] + 1e-3] {
+        assert!(branch.at(&found.family.cycles(branch.of), at).is_empty());
+    }
+}
+
+#[test]
 fn a_direct_drive_has_symmetric_orbits_of_odd_period() {
     let spec = formula("push", "k*cos(phase)", &[("k", 2.0)]);
     let push = Effect::new(Kind::Formula(Formula::new(&spec).expect("a formula")), &[0.2])
@@ -246,12 +319,9 @@ fn a_direct_drive_has_symmetric_orbits_of_odd_period() {
     let base =
         Pendulum::new(0.2, 0.0, 0.8, 0.0, 0.0).expect("in range").with_effect(push).expect("once");
     let course = Course::of(&base, base.parameter("push.k").expect("there"));
-    let found = along(course, [0.05, 0.9], (1, 0), 2);
+    let found = along(&course, [0.05, 0.9], (1, 0), 2);
     let family = &found.family;
-    let half = family
-        .branches
-        .iter()
-        .filter(|b| b.of.closure == pendmap::continuation::cycle::Closure::Half);
+    let half = family.branches.iter().filter(|b| b.of.closure == Closure::Half);
     assert!(half.count() >= 1);
     for branch in &family.branches {
         assert!(
@@ -264,12 +334,12 @@ fn a_direct_drive_has_symmetric_orbits_of_odd_period() {
 
 #[test]
 fn negative_damping_sheds_a_torus() {
-    let spec = formula("pump", "a*v - 0.5*v^3", &[("a", 1.0)]);
-    let pump = Effect::new(Kind::Formula(Formula::new(&spec).expect("a formula")), &[0.1])
+    let spec = formula("pump", "b*v - c*v^3", &[("b", 1.0), ("c", -1.0)]);
+    let pump = Effect::new(Kind::Formula(Formula::new(&spec).expect("a formula")), &[0.1, 0.5])
         .expect("in range");
     let base = driven(0.2, 0.05, 1.3).with_effect(pump).expect("once");
-    let course = Course::of(&base, base.parameter("pump.a").expect("there"));
-    let found = along(course, [0.1, 0.3], (1, 0), 1);
+    let course = Course::of(&base, base.parameter("pump.b").expect("there"));
+    let found = along(&course, [0.1, 0.3], (1, 0), 1);
     let all: Vec<f64> = events(&found, 1, Happens::NeimarkSacker);
     // Rest, hanging: the damping is none where the effect feeds what gamma takes.
     assert_near(&all, &[0.2], 1e-10);

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final, Unpack
 
@@ -24,7 +25,7 @@ from pendmap.errors import (
 from pendmap.files import facts
 from pendmap.files.variables import flag, variable
 from pendmap.formatting import counted, span
-from pendmap.model import without_dimensions
+from pendmap.model import Rig, without_dimensions
 from pendmap.units import VELOCITY
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 
     from pendmap.analysis.run import Keywords
     from pendmap.analysis.varied import Varied
-    from pendmap.model import Pendulum, Rig
+    from pendmap.model import Pendulum
     from pendmap.units import Units
 
 
@@ -235,13 +236,16 @@ def _start(
     if np.asarray(start, dtype=object).shape != (2,):
         raise InputError(f"start must be (angle, velocity), got {short_repr(start)}")
     angle, speed = (check_number("start", part) for part in start)
-    own = model.attributes.get(axis.name)
+    of_effects = {f"{e.name}.{key}": x for e in model.effects for key, x in e.parameters.items()}
+    value = {**model.attributes, **of_effects}.get(axis.name)
+    if axis.name == "frequency_hz" and isinstance(model, Rig):
+        value = model.Omega / math.tau
     low, high = axis.values[[0, -1]]
-    if not isinstance(own, float) or not low <= own <= high:
+    if not isinstance(value, float) or not low <= value <= high:
         raise InputError(
-            f"{axis.name} of the model must be in the range where a start is given, got {own}"
+            f"{axis.name} of the model must be in the range where a start is given, got {value}"
         )
-    return angle, float(units.bare(speed, VELOCITY)), own
+    return angle, float(units.bare(speed, VELOCITY)), value
 
 
 def _dataset(raw: _core.Continuation, axis: Varied, units: Units) -> xr.Dataset:
