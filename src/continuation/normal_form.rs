@@ -17,7 +17,7 @@ use super::period::{Image, Period};
 
 /// The shortest displacement along the null vector; others are twice and three times as long. Where phases change
 /// within, they are shortened by a factor, this many times at most.
-const BESIDE: f64 = 8e-3;
+const BESIDE: f64 = 4e-3;
 const SHORTER: f64 = 0.2;
 const TIMES: i32 = 4;
 /// A product of the null vectors below this is 0.

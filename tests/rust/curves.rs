@@ -1,5 +1,6 @@
 //! Curves in the plane of two parameters.
 
+use std::f64::consts::PI;
 use std::sync::atomic::AtomicBool;
 
 use pendmap::continuation::branch::{Bounds, End};
@@ -29,33 +30,35 @@ fn values(place: &nalgebra::DVector<f64>) -> [f64; 2] {
     [P[0] + a * (P[1] - P[0]), OMEGA[0] + b * (OMEGA[1] - OMEGA[0])]
 }
 
-/// The curves through the events of the branches of some orbits at one frequency.
+/// The curves through the events of the branches of some orbits at each frequency.
 fn plane(
     base: &Pendulum,
-    omega: f64,
+    omegas: &[f64],
     p: f64,
     starts: &[([f64; 2], usize)],
     longest: usize,
 ) -> Plane {
     let (course, cancel) = (course(base.clone()), AtomicBool::new(false));
     let mut plane = Plane::new(course.clone(), longest).unwrap();
-    let held = (omega - OMEGA[0]) / (OMEGA[1] - OMEGA[0]);
     let at = (p - P[0]) / (P[1] - P[0]);
     let bounds = Bounds { low: 0.0, high: 1.0 };
-    let mut family = Family::new(course.along(0, held), bounds, longest).unwrap();
-    let map = PoincareMap::new(&plane.pendulum([at, held]));
-    for (start, n) in starts {
-        let orbit = newton::find(&map, *start, *n, 1.0).unwrap();
-        family.add(&orbit, at, &cancel).unwrap();
-    }
-    for branch in &family.branches {
-        let cycles = family.cycles(branch.of);
-        for event in branch.run.events.iter().filter(|event| event.smooth) {
-            let orbit = &branch.run.orbits[event.orbit];
-            let points = cycles.points(&orbit.place);
-            let at = [cycles.at(&orbit.place), held];
-            let seed = Seed { of: branch.of, kind: event.kind, points, at, along: 1 };
-            plane.add(&seed, &cancel).unwrap();
+    for omega in omegas {
+        let held = (omega - OMEGA[0]) / (OMEGA[1] - OMEGA[0]);
+        let mut family = Family::new(course.along(0, held), bounds, longest).unwrap();
+        let map = PoincareMap::new(&plane.pendulum([at, held]));
+        for (start, n) in starts {
+            let orbit = newton::find(&map, *start, *n, 1.0).unwrap();
+            family.add(&orbit, at, &cancel).unwrap();
+        }
+        for branch in &family.branches {
+            let cycles = family.cycles(branch.of);
+            for event in branch.run.events.iter().filter(|event| event.smooth) {
+                let orbit = &branch.run.orbits[event.orbit];
+                let points = cycles.points(&orbit.place);
+                let at = [cycles.at(&orbit.place), held];
+                let seed = Seed { of: branch.of, kind: event.kind, points, at, along: 1 };
+                plane.add(&seed, &cancel).unwrap();
+            }
         }
     }
     plane
@@ -71,7 +74,7 @@ fn amplitudes(plane: &Plane, curve: &Curve, omega: f64) -> Vec<f64> {
 #[test]
 fn the_fold_of_the_rotation_has_its_known_amplitudes_and_ends_on_the_edges() {
     let base = Pendulum::new(0.1, 1.0, 2.0, 0.0, 0.0).unwrap();
-    let plane = plane(&base, 2.0, 1.0, &[([-2.82, 1.5], 1)], 1);
+    let plane = plane(&base, &[2.0], 1.0, &[([-2.82, 1.5], 1)], 1);
     let folds: Vec<&Curve> = plane.curves.iter().filter(|c| c.kind == Kind::Fold).collect();
     assert_eq!(folds.len(), 1);
     assert_eq!(folds[0].ends, [End::Range; 2]);
@@ -93,7 +96,7 @@ fn the_fold_of_the_rotation_has_its_known_amplitudes_and_ends_on_the_edges() {
 #[test]
 fn rest_changes_where_its_linear_equation_says() {
     let base = Pendulum::new(0.1, 1.0, 2.0, 0.0, 0.0).unwrap();
-    let plane = plane(&base, 1.2, 1.0, &[([0.0, 0.0], 1), ([3.141592653589793, 0.0], 1)], 1);
+    let plane = plane(&base, &[1.0, 2.0], 1.0, &[([0.0, 0.0], 1), ([PI, 0.0], 1)], 1);
     let omegas = [1.1, 1.2, 1.75, 2.4];
     for (balance, side) in [(Balance::Hanging, 1.0), (Balance::Inverted, -1.0)] {
         let known = tongues(&base, balance, &omegas, P[1], false, 1, &Control::default()).unwrap();
@@ -114,7 +117,7 @@ fn rest_changes_where_its_linear_equation_says() {
 #[test]
 fn the_fold_of_the_oscillation_begins_where_the_doubling_of_rest_changes() {
     let base = Pendulum::new(0.1, 1.0, 2.0, 0.0, 0.0).unwrap();
-    let plane = plane(&base, 2.0, 1.0, &[([0.0, 0.0], 1)], 2);
+    let plane = plane(&base, &[2.0], 1.0, &[([0.0, 0.0], 1)], 2);
     let (number, doubling) =
         plane.curves.iter().enumerate().find(|(_, c)| !c.degenerate.is_empty()).unwrap();
     let (kind, index) = doubling.degenerate[0];
