@@ -18,6 +18,8 @@ use crate::integrate::State;
 const ITERATIONS: [usize; 2] = [9, 16];
 const CONTRACTION: [f64; 2] = [0.3, 0.9];
 const SETTLED: f64 = 1e-12;
+/// A step that follows one below this and is hardly shorter is one of rounding.
+const STALLED: f64 = 1e-9;
 /// A gap of this many units of rounding is none.
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
 /// Displacement along `v` of the difference for a second derivative, near the cube root of rounding.
@@ -237,6 +239,10 @@ impl Critical<'_> {
             let step = bordered(&system.matrix, row).solve(&right)?;
             let length = step.norm();
             let grows = length > CONTRACTION[far] * before && length > SETTLED * size;
+            if grows && before < STALLED * size {
+                // No more than rounding is left.
+                return self.complete(place, guess, &system, row, vectors, bend);
+            }
             if !length.is_finite() || grows {
                 return None;
             }
