@@ -18,8 +18,8 @@ use crate::integrate::State;
 const ITERATIONS: [usize; 2] = [9, 16];
 const CONTRACTION: [f64; 2] = [0.3, 0.9];
 const SETTLED: f64 = 1e-12;
-/// A step that follows one below this and is hardly shorter is one of rounding.
-const STALLED: f64 = 1e-9;
+/// Where steps no longer shrink, a gap below this is one of rounding.
+const STALLED: f64 = 1e-11;
 /// A gap of this many units of rounding is none.
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
 /// Displacement along `v` of the difference for a second derivative, near the cube root of rounding.
@@ -133,40 +133,30 @@ impl Critical<'_> {
         Some(Border([svd.u?.column(least).into(), svd.v_t?.row(least).transpose()]))
     }
 
-    /// The system at a place, the null vectors and the coefficient of the square; with the border of a neighbour, and its
-    /// right null vector as the direction of second derivatives.
+    /// The system at a place, the null vectors and the coefficient of the square.
     fn system(
         &self,
         place: &DVector<f64>,
-        border: Option<(&Border, &DVector<f64>)>,
+        border: Option<&Border>,
     ) -> Option<(System, Border, f64)> {
         let at = Self::at(place);
         let map = Period::<4>::new(self.cycles.course, &at);
         let points = self.points(place);
         let (count, moving, root) = (points.len(), self.moving(), self.cycles.root());
-        let laps = |along: &DVector<f64>| {
-            [BESIDE, -BESIDE].map(|by| Self::beside(&points, along, by / along.norm()))
-        };
-        // All at once where the direction is known: they share the drive.
-        let mut all = vec![points.clone()];
-        all.extend(border.into_iter().flat_map(|(_, along)| laps(along)));
-        let mut sides = self.images(&map, &all);
-        let images = sides.remove(0);
+        let images = self.images(&map, std::slice::from_ref(&points)).pop()?;
         let parts: Vec<Matrix2<f64>> = images.iter().map(|image| image.by_state).collect();
         let own;
-        let border = match border {
-            Some((border, _)) => border,
-            None => {
-                own = self.border(&parts)?;
-                &own
-            }
+        let border = if let Some(border) = border {
+            border
+        } else {
+            own = self.border(&parts)?;
+            &own
         };
         let (weak, Border([b, c])) = (self.cycles.weak(&parts, self.multiplier()), border);
         let (right, g) = null_vector(&weak, b, c)?;
         let (left, _) = null_vector(&weak.transpose(), c, b)?;
-        if sides.is_empty() {
-            sides = self.images(&map, &laps(&right));
-        }
+        let sides = [BESIDE, -BESIDE].map(|by| Self::beside(&points, &right, by / right.norm()));
+        let sides = self.images(&map, &sides);
         let per_unit = right.norm() / (2.0 * BESIDE);
 
         let (shift, factors) = (self.cycles.closing().1, self.factors());
@@ -205,7 +195,7 @@ impl Critical<'_> {
         let norm = parts.iter().map(Matrix2::norm).fold(0.0, f64::max);
         let finite = gap.iter().chain(matrix.iter()).all(|x| x.is_finite());
         // Without the lengths of the vectors.
-        let sizes = [&left, &right].map(|vector| vector.norm());
+        let sizes = [left.norm(), right.norm()];
         let bend = square / (sizes[0] * sizes[1] * sizes[1]);
         let border = Border([left / sizes[0], right / sizes[1]]);
         finite.then_some((System { gap, matrix, images, norm }, border, bend))
@@ -223,10 +213,9 @@ impl Critical<'_> {
         let mut place = guess.clone();
         let mut before = f64::INFINITY;
         let mut kept = border.cloned();
-        let mut along = border.map(|Border([_, right])| right.clone());
         let far = usize::from(border.is_none());
         for _ in 0..ITERATIONS[far] {
-            let (system, vectors, bend) = self.system(&place, kept.as_ref().zip(along.as_ref()))?;
+            let (system, vectors, bend) = self.system(&place, kept.as_ref())?;
             let size = place.amax().max(1.0);
             let rounding = ROUNDING * (1.0 + system.norm) * size;
             let gap = system.gap.amax();
@@ -239,15 +228,13 @@ impl Critical<'_> {
             let step = bordered(&system.matrix, row).solve(&right)?;
             let length = step.norm();
             let grows = length > CONTRACTION[far] * before && length > SETTLED * size;
-            if grows && before < STALLED * size {
+            if grows && gap < STALLED * (1.0 + system.norm) * size {
                 // No more than rounding is left.
                 return self.complete(place, guess, &system, row, vectors, bend);
             }
             if !length.is_finite() || grows {
                 return None;
             }
-            let Border([_, right]) = &vectors;
-            along = Some(right.clone());
             kept = kept.or(Some(vectors));
             before = length;
             place -= step;

@@ -36,6 +36,8 @@ const CLOSE: f64 = 0.1;
 /// Refinements of a zero at most, and the part of a step at which it is known.
 const REFINEMENTS: usize = 40;
 const EXACT: f64 = 1e-14;
+/// A coefficient that vanishes is at most this part of those beside it.
+const ZERO: f64 = 1e-4;
 
 /// What a point of codimension 2 is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -89,7 +91,7 @@ impl Critical<'_> {
     ///
     /// # Errors
     /// [`Error::Interrupted`] if `cancel` is set.
-    pub fn followed(&self, first: Point, cancel: &AtomicBool) -> Result<Run, Error> {
+    pub fn followed(&self, first: &Point, cancel: &AtomicBool) -> Result<Run, Error> {
         let end = End::Lost(first.orbit.norm);
         let mut run = Run { points: vec![first.clone()], degenerate: Vec::new(), end, met: None };
         let (mut length, mut refused) = (FIRST, None);
@@ -198,7 +200,7 @@ impl Critical<'_> {
     }
 
     /// A place with this coordinate between two points, by Hermite's cubic.
-    fn guess(&self, a: &Point, b: &Point, axis: usize, goal: f64) -> Option<DVector<f64>> {
+    fn guess(a: &Point, b: &Point, axis: usize, goal: f64) -> Option<DVector<f64>> {
         let entry = a.orbit.place.len() - 2 + axis;
         let [low, high] = [a, b].map(|one| one.orbit.place[entry]);
         let part = (goal - low) / (high - low);
@@ -212,7 +214,7 @@ impl Critical<'_> {
 
     /// The point with this coordinate between two.
     pub(super) fn between(&self, a: &Point, b: &Point, axis: usize, goal: f64) -> Option<Point> {
-        let guess = self.guess(a, b, axis, goal)?;
+        let guess = Self::guess(a, b, axis, goal)?;
         let entry = guess.len() - 2 + axis;
         let mut row = DVector::zeros(guess.len());
         row[entry] = (b.orbit.place[entry] - a.orbit.place[entry]).signum();
@@ -245,7 +247,7 @@ impl Critical<'_> {
                 let apart = Self::at(found)[1 - axis] - at[1 - axis];
                 apart.abs() < within && self.is_same(found, place, within)
             };
-            self.guess(a, b, axis, at[axis]).is_some_and(|guess| same(&guess, near.max(SAME)))
+            Self::guess(a, b, axis, at[axis]).is_some_and(|guess| same(&guess, near.max(SAME)))
                 && self
                     .between(a, b, axis, at[axis])
                     .is_some_and(|found| same(&found.orbit.place, SAME))
@@ -307,6 +309,8 @@ impl Critical<'_> {
                 break;
             }
         }
-        best
+        // The signs at the ends are those of some digits alone.
+        let least = ZERO * a.coefficient.abs().max(b.coefficient.abs());
+        best.filter(|point| point.coefficient.abs() < least)
     }
 }

@@ -15,11 +15,13 @@ use super::cycle::Closure;
 use super::event::Kind;
 use super::period::{Image, Period};
 
-/// The shortest displacement along the null vector; others are twice and three times as long. Where phases change
-/// within, they are shortened by a factor, this many times at most.
-const BESIDE: f64 = 4e-3;
-const SHORTER: f64 = 0.2;
-const TIMES: i32 = 4;
+/// The longest displacement along the null vector, and its halvings at most: until the differences at it and at half of it
+/// are this near to one another, over the size of what is projected on `w`.
+const BESIDE: f64 = 0.032;
+const HALVINGS: i32 = 12;
+const ALIKE: f64 = 0.02;
+/// The part of that displacement at which the coefficient is precise.
+const PRECISE: f64 = 0.125;
 /// A product of the null vectors below this is 0.
 const NONE: f64 = 1e-9;
 /// Weights of differences at distances 1, 2 and 3 that leave errors of the sixth power.
@@ -38,11 +40,22 @@ impl Critical<'_> {
     /// The coefficient `w v c`; none where the sequence of phases changes nearby.
     #[must_use]
     pub fn cubic(&self, point: &Point, precise: bool) -> Option<f64> {
-        let weights: &[f64] = if precise { &WEIGHTS } else { &[1.0] };
-        (0..TIMES).find_map(|k| self.cubic_within(point, BESIDE * SHORTER.powi(k), weights))
+        let at = |distance: f64, weights: &[f64]| self.cubic_within(point, distance, weights);
+        let mut before: Option<f64> = None;
+        for k in 0..HALVINGS {
+            let distance = BESIDE * 0.5_f64.powi(k);
+            let Some([here, size]) = at(distance, &[1.0]) else { continue };
+            if before.is_some_and(|before| (here - before).abs() < ALIKE * size) {
+                let found = if precise { at(PRECISE * distance, &WEIGHTS)?[0] } else { here };
+                return Some(found);
+            }
+            before = Some(here);
+        }
+        None
     }
 
-    fn cubic_within(&self, point: &Point, distance: f64, weights: &[f64]) -> Option<f64> {
+    /// The coefficient by differences at a distance, and the size of what is projected on `w`.
+    fn cubic_within(&self, point: &Point, distance: f64, weights: &[f64]) -> Option<[f64; 2]> {
         let place = &point.orbit.place;
         let [left, right] = point.border.vectors();
         let points = self.points(place);
@@ -64,23 +77,24 @@ impl Critical<'_> {
         let mut first = vec![Matrix2::zeros(); count];
         let mut second = vec![Matrix2::zeros(); count];
         for (k, weight) in weights.iter().enumerate() {
-            for i in 0..count {
+            let shares = first.iter_mut().zip(&mut second).enumerate();
+            for (i, (first, second)) in shares {
                 let [above, below] = [2 * k, 2 * k + 1].map(|lap| images[lap][i].by_state);
                 let twice = point.orbit.parts[i] * 2.0;
-                first[i] += (above - below) * (weight * factors[i] / (2.0 * by(k)));
-                second[i] += (above - twice + below) * (weight * factors[i] / by(k).powi(2));
+                *first += (above - below) * (weight * factors[i] / (2.0 * by(k)));
+                *second += (above - twice + below) * (weight * factors[i] / by(k).powi(2));
             }
         }
         let of = |vector: &DVector<f64>, i: usize| Vector2::new(vector[2 * i], vector[2 * i + 1]);
         let mut bent = DVector::zeros(2 * count);
         if self.cycles.of.closure != Closure::Rest {
-            for i in 0..count {
-                bent.rows_mut(2 * i, 2).copy_from(&(first[i] * of(right, i) * -0.5));
+            for (i, first) in first.iter().enumerate() {
+                bent.rows_mut(2 * i, 2).copy_from(&(first * of(right, i) * -0.5));
             }
             bent = self.cycles.weak(&point.orbit.parts, 1.0).lu().solve(&bent)?;
         }
         let third = |i: usize| second[i] * of(right, i) / 6.0 + first[i] * of(&bent, i);
         let sum: f64 = (0..count).map(|i| of(left, i).dot(&third(i))).sum();
-        Some(sum)
+        Some([sum, (0..count).map(|i| third(i).norm()).sum()])
     }
 }

@@ -148,7 +148,7 @@ impl Plane {
             return Ok(());
         }
         let first = Point { coefficient: critical.coefficient(&first, false), ..first };
-        let ahead = critical.followed(first.clone(), cancel)?;
+        let ahead = critical.followed(&first, cancel)?;
         let mut curve = Curve::of(of, seed.kind, ahead);
         if curve.ends[1] == End::Closed {
             curve.ends[0] = End::Closed;
@@ -156,7 +156,7 @@ impl Plane {
             let mut turned = first;
             turned.orbit.tangent.neg_mut();
             turned.orbit.orientation = !turned.orbit.orientation;
-            curve.begins(critical.followed(turned, cancel)?);
+            curve.begins(critical.followed(&turned, cancel)?);
         }
         self.curves.push(curve);
         Ok(())
@@ -240,7 +240,7 @@ impl Plane {
                 continue;
             }
             let end = if curve.of.closure == Closure::Rest { End::Rest } else { End::Parent };
-            let mut curve = Curve::of(of, Kind::Fold, child.followed(first, cancel)?);
+            let mut curve = Curve::of(of, Kind::Fold, child.followed(&first, cancel)?);
             curve.ends[0] = end;
             curve.meets[0] = Some((index, number));
             curve.insert(0, begin);
