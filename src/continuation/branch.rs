@@ -10,6 +10,7 @@ use nalgebra::DVector;
 
 use super::cycle::{Cycles, Orbit};
 use super::event::{self, Event};
+use super::phases::Phase;
 use super::transition;
 use crate::error::{Error, unless_cancelled};
 use std::sync::atomic::AtomicBool;
@@ -28,6 +29,8 @@ const MOST: f64 = 2.5;
 const CHANGE: [f64; 2] = [0.25, 2.0];
 /// Steps over a place where branches cross.
 const ACROSS: [f64; 3] = [1e-4, 1e-3, 1e-2];
+/// A multiplier this near to 1 is 1.
+const FADES: f64 = 1e-6;
 /// Steps of a branch at most.
 const STEPS: usize = 20_000;
 /// Fastest motion of an orbit that is followed.
@@ -208,6 +211,7 @@ impl Cycles<'_> {
                 return Some(End::Sticks);
             }
             _ => {
+                run.orbits.extend(self.swallowed(here));
                 transition::swallowed(run);
                 return refused;
             }
@@ -236,7 +240,9 @@ impl Cycles<'_> {
         if let Some((end, last)) = self.meeting(here, &next) {
             return Step::Over(end, Some(Box::new(last)));
         }
-        if next.stuck && !here.stuck {
+        // Where a motion between sticks fades, its neighbours stay too, and a multiplier is 1.
+        let fades = next.phases.contains(&Phase::Stick) && next.tests[0].abs() < FADES;
+        if (next.stuck && !here.stuck) || fades {
             *refused = Some(End::Sticks);
             return Step::Long(CHANGE[0]);
         }

@@ -16,7 +16,7 @@ use crate::orbit::PeriodicOrbit;
 use crate::orbit::symmetry::Mirror;
 
 /// Largest distance of the last orbit of a branch from the orbit that it meets.
-const MEETS: f64 = 0.03;
+const MEETS: f64 = 1e-3;
 
 /// A branch of orbits of one type.
 #[derive(Clone, Debug)]

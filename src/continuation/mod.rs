@@ -12,6 +12,7 @@
 //!   new orbits live on; [`curve`]: curves of them; [`plane`]: all curves
 
 pub mod branch;
+mod closure;
 pub mod course;
 pub mod critical;
 pub mod curve;

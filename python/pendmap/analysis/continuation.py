@@ -262,9 +262,13 @@ def _dataset(raw: _core.Continuation, axis: Varied, units: Units) -> xr.Dataset:
         numbers = np.array([choose(part) for part in parts], dtype=float)
         return "branch", numbers, axis.attributes
 
+    def number_or_none(values: Any, meaning: str) -> Any:  # noqa: ANN401 (arrays)
+        return variable("branch", values, "1", meaning, "-1: none", missing=-1)
+
     meets = np.array(raw.meets, dtype=np.int32).reshape(-1, 2)
     words = np.array(raw.ends, dtype=str).reshape(-1, 2)
-    multiplier = "Floquet multiplier, real and imaginary part"
+    multiplier, pair = "Floquet multiplier, real and imaginary part", ("eigenvalue", "part")
+    phases, kinds = (np.array(x, dtype=str) for x in (raw.phases, raw.event_kind))
     place = raw.event_orbit.astype(np.int64)
     data: dict[str, Any] = {
         "branch_n": variable("branch", raw.n, "periods", "smallest period"),
@@ -276,55 +280,36 @@ def _dataset(raw: _core.Continuation, axis: Varied, units: Units) -> xr.Dataset:
         "branch_last": of_branch(lambda part: part[-1]),
         "branch_low": of_branch(np.min),
         "branch_high": of_branch(np.max),
-        **{
-            f"branch_{name}_event": variable(
-                "branch", meets[:, k], "1", f"event at its {name}", "-1: none", missing=-1
-            )
-            for k, name in enumerate(("begin", "end"))
-        },
-        "branch_twin": variable(
-            "branch", raw.twin, "1", "branch of the mirror images", "-1: none", missing=-1
-        ),
+        "branch_begin_event": number_or_none(meets[:, 0], "event at its beginning"),
+        "branch_end_event": number_or_none(meets[:, 1], "event at its end"),
+        "branch_twin": number_or_none(raw.twin, "branch of the mirror images"),
         "orbit_branch": variable("orbit", owner, "1", "number of the branch"),
         "orbit_value": ("orbit", value, axis.attributes),
-        "orbit_multipliers": variable(
-            ("orbit", "eigenvalue", "part"), multipliers, "1", multiplier
-        ),
+        "orbit_multipliers": variable(("orbit", *pair), multipliers, "1", multiplier),
         "orbit_stable": flag("orbit", stable, "whether it is stable"),
-        "orbit_phases": variable(
-            "orbit", np.array(raw.phases, dtype=str), long_name="slips + -, sticks 0, in turn"
-        ),
+        "orbit_phases": variable("orbit", phases, long_name="slips + -, sticks 0, in turn"),
         "point_orbit": variable("point", raw.point_orbit, "1", "number of the orbit"),
         **point("point", raw.theta, speed, units.of_velocity, "point_{}"),
-        "event_kind": variable(
-            "event", np.array(raw.event_kind, dtype=str), long_name="what happens"
-        ),
+        "event_kind": variable("event", kinds, long_name="what happens"),
         "event_value": ("event", value[place], axis.attributes),
         **point(
             "event", raw.theta[first[place]], speed[first[place]], units.of_velocity, "event_{}"
         ),
         "event_n": variable("event", raw.n[owner[place]], "periods", "smallest period"),
         "event_w": variable("event", raw.w[owner[place]], "turns", "net turns over it"),
-        "event_multipliers": variable(
-            ("event", "eigenvalue", "part"), multipliers[place], "1", multiplier
-        ),
+        "event_multipliers": variable(("event", *pair), multipliers[place], "1", multiplier),
         "event_supercritical": flag(
             "event", raw.supercritical, "whether new orbits live beyond it", _CRITICALITY
         ),
         "event_smooth": flag("event", raw.smooth, "whether the map is smooth there"),
         "event_branch": variable("event", owner[place], "1", "number of the branch"),
         "event_orbit": variable("event", at, "1", "number of the orbit"),
-        "section_value": (
-            "section",
-            np.array([s[0] for s in raw.sections], float),
-            axis.attributes,
-        ),
-        "section_orbits": variable(
-            "section", np.array([s[1] for s in raw.sections], np.int32), "1", "orbits found there"
-        ),
     }
-    if not raw.sections:  # a table of an empty dimension has no rows
-        del data["section_value"], data["section_orbits"]
+    if raw.sections:  # a table of an empty dimension has no rows
+        places, counts = zip(*raw.sections, strict=True)
+        data["section_value"] = ("section", np.array(places, float), axis.attributes)
+        counted_there = np.array(counts, np.int32)
+        data["section_orbits"] = variable("section", counted_there, "1", "orbits found there")
     return xr.Dataset(data)
 
 

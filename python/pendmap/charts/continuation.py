@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from pendmap.analysis.result import rows
 from pendmap.charts import names, plane
 from pendmap.charts.chart import Axis, Chart, Panel, holding
 from pendmap.charts.marks import DASHED, INK, Line, Mark, Points
@@ -21,9 +23,7 @@ _MARKERS: Final = {
     "period_doubling": "o",
     "symmetry_breaking": "^",
     "neimark_sacker": "D",
-    "stick_onset": "v",
-    "grazing": "v",
-    "rest_boundary": "v",
+    **dict.fromkeys(("stick_onset", "grazing", "rest_boundary"), "v"),
 }
 
 
@@ -33,7 +33,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     a, name = facts(dataset), str(dataset.attrs["varied"])
     units = Units.of(a)
     theta = plane.angles(dataset, dataset["point_theta"].values)
-    sides = names.phase_plane(theta, holding(dataset["point_velocity"].values, 0.0), units)
+    sides = names.phase_plane(theta, holding(dataset["point_velocity"].values), units)
     label = names.symbol(name, str(dataset["orbit_value"].attrs.get("units", "1")))
     below = Axis(label, (float(a["low"]), float(a["high"])))
     panels = [
@@ -41,8 +41,8 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
         for which, side in zip(("theta", "velocity"), sides, strict=True)
     ]
     title = f"Branches of orbits {a['n']}:{a['w']} over {names.over([name])}"
-    subtitle = names.parameters(a, [name])
-    return Chart(title, subtitle, [[panel] for panel in panels], size=(7.4, 6.8)).only(layer)
+    chosen = names.parameters(a, [name])
+    return Chart(title, chosen, [[panel] for panel in panels], size=(7.4, 6.8)).only(layer)
 
 
 def _marks(dataset: xr.Dataset, which: str) -> list[Mark]:
@@ -51,11 +51,11 @@ def _marks(dataset: xr.Dataset, which: str) -> list[Mark]:
     stable, of = dataset["orbit_stable"].values.astype(bool), dataset["point_orbit"].values
     y = dataset[f"point_{which}"].values
     marks: list[Mark] = []
-    for number, n in enumerate(dataset["branch_n"].values.tolist()):
+    types = [*rows(dataset, "branch_n", "branch_w")]
+    colours = dict(zip(dict.fromkeys(types), itertools.cycle(_COLOURS), strict=False))
+    for number, (n, w) in enumerate(types):
         mine = branch == number
         points, x, full = y[mine[of]].reshape(-1, n), value[mine], stable[mine]
-        colour = _COLOURS[number % len(_COLOURS)]
-        w = int(dataset["branch_w"].values[number])
         for way, (dash, shown) in enumerate((("-", full), (DASHED, ~full))):
             # A piece belongs to both looks at the orbit where it changes.
             near = shown | np.roll(shown, 1) & (np.arange(shown.size) > 0)
@@ -64,7 +64,7 @@ def _marks(dataset: xr.Dataset, which: str) -> list[Mark]:
                 wraps = np.abs(np.diff(line, prepend=line[:1])) > np.pi
                 line[wraps if which == "theta" else np.zeros_like(wraps)] = np.nan
                 text = f"{n}:{w}" if not way and not k else ""
-                look: dict[str, Any] = {"colour": colour, "dash": dash, "name": text}
+                look: dict[str, Any] = {"colour": colours[n, w], "dash": dash, "name": text}
                 marks.append(Line(x, line, path=f"{number}/{way}/{k}", **look))
     kinds = dataset["event_kind"].values
     for kind in dict.fromkeys(kinds.tolist()):
