@@ -13,6 +13,7 @@ use crate::integrate::State;
 use crate::model::Pendulum;
 use crate::model::pendulum::Symmetry;
 use crate::orbit::PeriodicOrbit;
+use crate::orbit::newton::SAME;
 use crate::orbit::symmetry::Mirror;
 
 /// Largest distance of the last orbit of a branch from the orbit that it meets.
@@ -94,7 +95,7 @@ impl Family {
                 let points = cycles.all_points(&found.place);
                 let first = points[0];
                 let image = [-first[0], -first[1]];
-                orbit.contains(first, 1e-6) || mirrored && orbit.contains(image, 1e-6)
+                orbit.contains(first, SAME) || mirrored && orbit.contains(image, SAME)
             })
         })
     }

@@ -14,9 +14,8 @@ use crate::integrate::tangent::Tangent;
 use crate::lanes::sine::Fine;
 use crate::lanes::{InstructionSet, Isa, Job, Real, dispatch};
 use crate::model::Equation;
+use crate::orbit::poincare::STEP;
 
-/// A step short enough for errors near 1e-15 a period.
-const STEP: f64 = 0.025;
 /// Below this argument an exponential or logarithm is a series, whose terms above this many are below rounding.
 const SHORT: f64 = 0.05;
 const TERMS: u32 = 12;

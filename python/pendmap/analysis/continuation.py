@@ -180,16 +180,19 @@ def continuation(  # noqa: PLR0913 (physics first, numerical choices by name)
     >>> result.event_kind.values.tolist(), result.event_value.values.round(9)
     (['period_doubling', 'fold'], array([1.34685852, 0.41678757]))
     """
-    pendulum = varied.having(pendulum, ranges)
     if isinstance(ranges, Mapping) and len(ranges) == 2 and _are_axes(ranges):  # noqa: PLR2004
-        axes = varied.varied(pendulum, _with_count(ranges), 2)
+        pendulum = varied.having(pendulum, ranges)
+        pairs = {name: (*ends[:2], _PLACES) for name, ends in ranges.items()}
+        axes = varied.varied(pendulum, pairs, 2)
         numerics = Numerics(RunOptions.of(run, options).in_memory("continuation"))
         dataset, request = curves.in_plane(pendulum, axes, up_to, numerics)
         known = numerics.provenance() | request
         say, what = curves.summary, "curves are"
         varied.complete(SCHEMA, dataset, pendulum, axes, known, summary=say, what=what)
         return dataset
-    (axis,) = varied.varied(pendulum, _with_count(ranges), 1)
+    ranges = _with_count(ranges)
+    pendulum = varied.having(pendulum, ranges)
+    (axis,) = varied.varied(pendulum, ranges, 1)
     bare, units = without_dimensions(pendulum)
     n = check_whole("n", n, 1, LONGEST)
     w = check_whole("w", w, -MOST_CELLS, MOST_CELLS)
@@ -216,17 +219,16 @@ def _are_axes(ranges: Mapping[str, ArrayLike]) -> bool:
 
 
 def _with_count(ranges: Mapping[str, ArrayLike]) -> Mapping[str, ArrayLike]:
-    """Return ranges of two ends with a number of values."""
-    if not isinstance(ranges, Mapping):
-        return ranges
-    pairs = {
-        name: (*ends[:2], _PLACES) if isinstance(ends, tuple) and len(ends) in {2, 3} else ends
-        for name, ends in ranges.items()
-    }
-    for name, ends in pairs.items():
-        if isinstance(ends, tuple) and len(ends) == 3 and ends[0] == ends[1]:  # noqa: PLR2004
-            raise InputError(f"{name} must be a range of two values, got {short_repr(ends[:2])}")
-    return pairs
+    """Return a range of two ends with a number of values."""
+    pairs = dict(ranges) if isinstance(ranges, Mapping) else {}
+    ends = {k: one for k, one in pairs.items() if isinstance(one, tuple) and len(one) in {2, 3}}
+    got = {k: one[:2] for k, one in ends.items()} or "nothing"
+    if not pairs or len(ends) > 1 or any(one[0] == one[1] for one in ends.values()):
+        raise InputError(
+            "one parameter must vary over a range of two values, like {'p': (0.3, 1.6)}, or on the"
+            f" command line --vary p 0.3:1.6; got {got}"
+        )
+    return pairs | {k: (*one[:2], _PLACES) for k, one in ends.items()}
 
 
 def _start(

@@ -125,10 +125,6 @@ def _bare_sensor(run: FitRun, units: Units) -> dict[str, Any] | None:
         return None
     return {
         "rate": float(units.given(sensor.rate, 1)),
-        "place": 0.0,  # of an accelerometer, like "gravity"
-        "gravity": 0.0,
-        # A reading is the mean over a sampling interval.
-        "interval": float(units.bare(float(np.median(np.diff(run.time))), -1)),
         "angle": np.ascontiguousarray(sensor.angle, np.float64),
     }
 

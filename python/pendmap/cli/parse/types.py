@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import importlib
 import math
@@ -130,9 +131,8 @@ def _values(text: str) -> list[float]:
 
 def _ends(text: str) -> AxisText:
     """Read the two ends of a range, in which values are chosen by the computation."""
-    parts = text.split(":")
-    if len(parts) == 2:  # noqa: PLR2004
-        return _range(f"{text}:2")
+    with contextlib.suppress(InputError):
+        return _range(f"{text}:2" if text.count(":") == 1 else "")
     raise InputError(f"must be A:B, the ends of a range, like 0.5:2, got {text!r}")
 
 
