@@ -13,7 +13,6 @@ __all__ = [
     "Bifurcation",
     "BifurcationSet",
     "Continuation",
-    "CriticalAmplitudes",
     "Diverged",
     "Ensemble",
     "Fit",
@@ -29,6 +28,7 @@ __all__ = [
     "Survey",
     "Texture",
     "TextureSum",
+    "Tongues",
     "Trajectory",
     "Uncertainty",
     "WindowRows",
@@ -344,15 +344,15 @@ class Ensemble:
     sum: _Pair
 
 @final
-class CriticalAmplitudes:
-    rest: bool
-    p: list[float]
-    multiplier: list[float]
-    stable: list[bool]
-    moved: bool
-    fold: tuple[float, float, float] | None
-    @staticmethod
-    def no_rest() -> CriticalAmplitudes: ...
+class Tongues:
+    index: NDArray[np.int32]
+    inverted: list[bool]
+    p: _Floats
+    multiplier: _Floats
+    above: list[bool]
+    first: list[tuple[bool, bool]]
+    upright: bool
+    curves: BifurcationSet | None
 
 class FitPoint:
     values: _Floats
@@ -472,13 +472,11 @@ def growth(
 ) -> _Floats: ...
 def tongues(
     model: Pendulum,
-    inverted: bool,
     omegas: Sequence[float],
     p_max: float,
-    folds: bool,
     threads: int,
     progress: _Progress | None = None,
-) -> list[CriticalAmplitudes]: ...
+) -> Tongues: ...
 def fit_runs(
     runs: Sequence[dict[str, Any]],
     free: Sequence[_Free],

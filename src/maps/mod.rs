@@ -13,8 +13,7 @@
 //! - [`parameter_map`]: the attractors over a plane of two parameters; [`survey`]: its blocks; [`cell`],
 //!   [`resolution`]: one pendulum of it, and its step length
 //! - [`bifurcation`]: the attractors along one parameter, and one followed up and down
-//! - [`tongues`]: critical amplitudes of the stability of rest, by `chebyshev`; `continuation`:
-//!   under a torque
+//! - [`tongues`]: critical amplitudes of the stability of rest
 //! - [`advance`]: plain integration of many starts
 //! - [`bounds`]: the number of periods within which a trajectory must settle
 //! - `stored`: plans and blocks as bytes
@@ -29,8 +28,6 @@ pub mod boundary_distance;
 pub mod bounds;
 pub mod branches;
 pub mod cell;
-mod chebyshev;
-mod continuation;
 pub mod control;
 pub mod curves;
 pub mod ensemble;

@@ -4,8 +4,9 @@ use numpy::PyArray2;
 use pendmap::continuation::course::{Course, Law};
 use pendmap::continuation::critical::Critical;
 use pendmap::continuation::cycle::Closure;
+use pendmap::continuation::plane::Plane;
 use pendmap::error::Error;
-use pendmap::maps::curves::{Curves, Request, curves as search};
+use pendmap::maps::curves::{Request, Section, curves as search};
 use pendmap::model::Parameter;
 use pyo3::prelude::*;
 
@@ -65,12 +66,11 @@ pub fn bifurcation_set(
     let course = Course { base, axes };
     let request = Request { longest, threads };
     let found = interruptible(py, progress.as_ref(), |control| search(&course, &request, control))?;
-    BifurcationSet::new(py, &found)
+    BifurcationSet::new(py, &found.plane, &found.sections)
 }
 
 impl BifurcationSet {
-    fn new(py: Python<'_>, found: &Curves) -> PyResult<Self> {
-        let plane = &found.plane;
+    pub(super) fn new(py: Python<'_>, plane: &Plane, sections: &[Section]) -> PyResult<Self> {
         let all = &plane.curves;
         let angle = plane.course.base.angle();
         let sign = |known: Option<bool>| known.map_or(-1, i32::from);
@@ -114,11 +114,7 @@ impl BifurcationSet {
             supercritical: array(py, supercritical),
             degenerate_kind,
             degenerate_place: array(py, degenerate_place),
-            sections: found
-                .sections
-                .iter()
-                .map(|s| (s.held.0, s.held.1, s.orbits, s.new))
-                .collect(),
+            sections: sections.iter().map(|s| (s.held.0, s.held.1, s.orbits, s.new)).collect(),
         })
     }
 }

@@ -120,7 +120,7 @@ mod _core {
         parameter_maps::{Bifurcation, Followed, ParameterMap, parameter_names},
         period, reckon, simd, simd_available,
         surveys::Survey,
-        tongues::{CriticalAmplitudes, tongues},
+        tongues::{Tongues, tongues},
     };
 
     #[pymodule_init]

@@ -11,10 +11,10 @@ use pendmap::continuation::cycle::Closure;
 use pendmap::continuation::event::Kind;
 use pendmap::continuation::family::Family;
 use pendmap::continuation::plane::{Curve, Plane, Seed};
-use pendmap::maps::control::Control;
-use pendmap::maps::tongues::{Balance, tongues};
 use pendmap::model::{Parameter, Pendulum};
 use pendmap::orbit::{PoincareMap, newton};
+
+use crate::hill;
 
 const P: [f64; 2] = [0.0, 2.5];
 const OMEGA: [f64; 2] = [0.5, 3.0];
@@ -98,17 +98,16 @@ fn rest_changes_where_its_linear_equation_says() {
     let base = Pendulum::new(0.1, 1.0, 2.0, 0.0, 0.0).unwrap();
     let plane = plane(&base, &[1.0, 2.0], 1.0, &[([0.0, 0.0], 1), ([PI, 0.0], 1)], 1);
     let omegas = [1.1, 1.2, 1.75, 2.4];
-    for (balance, side) in [(Balance::Hanging, 1.0), (Balance::Inverted, -1.0)] {
-        let known = tongues(&base, balance, &omegas, P[1], false, 1, &Control::default()).unwrap();
+    for side in [1.0, -1.0] {
         let own = |curve: &&Curve| {
             curve.of.closure == Closure::Rest && side * curve.of.centre.cos() > 0.0
         };
-        for exact in known {
+        for omega in omegas {
             let curves = plane.curves.iter().filter(own);
-            let all: Vec<f64> = curves.flat_map(|c| amplitudes(&plane, c, exact.omega)).collect();
-            for one in exact.critical.iter().filter(|one| one.p > 0.0) {
-                let near = all.iter().any(|p| (p - one.p).abs() < 1e-9);
-                assert!(near, "{balance:?} {}: {} of {all:?}", exact.omega, one.p);
+            let all: Vec<f64> = curves.flat_map(|c| amplitudes(&plane, c, omega)).collect();
+            for (exact, _) in hill::critical(0.1, omega, side, P[1]) {
+                let near = all.iter().any(|p| (p - exact).abs() < 1e-9);
+                assert!(near, "{side} {omega}: {exact} of {all:?}");
             }
         }
     }

@@ -10,17 +10,20 @@ import xarray as xr
 from pendmap import _core
 from pendmap.analysis import result
 from pendmap.analysis.result import rows
-from pendmap.errors import check_whole, core_errors
+from pendmap.errors import InputError, check_whole, core_errors
 from pendmap.files.variables import flag, variable
 from pendmap.formatting import counted
 from pendmap.model import without_dimensions
 from pendmap.units import VELOCITY
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from pendmap.analysis.run import Numerics
     from pendmap.analysis.varied import Varied
     from pendmap.model import Pendulum, Rig
     from pendmap.signal import Floats
+    from pendmap.units import Units
 
 LONGEST = 16  # Longest period of orbits whose curves are followed, in forcing periods
 _CRITICALITY = {-1: "no meaning", 0: "subcritical", 1: "supercritical"}
@@ -64,12 +67,18 @@ def in_plane(
     """Return the curves in the plane of two axes as variables, and what was asked."""
     bare, units = without_dimensions(pendulum)
     longest = check_whole("up_to", longest, 1, LONGEST)
+    if any(axis.values.size == 1 for axis in axes):
+        raise InputError(
+            f"curves must be over two ranges, got one value of {axes[0].name} or {axes[1].name}"
+        )
     first, second = ((_places(axis.values).tolist(), axis.kernel) for axis in axes)
     with core_errors():
         run = numerics.run
         raw = _core.bifurcation_set(bare, (first, second), longest, run.workers, run.progress)
-    dataset = _dataset(raw, axes, units.given(raw.velocity, VELOCITY), units.of_velocity)
-    asked = {"varied": ", ".join(axis.name for axis in axes), "up_to": longest}
+    dataset = xr.Dataset(variables(raw, axes, units))
+    low, high = ([float(axis.values[end]) for axis in axes] for end in (0, -1))
+    named = ", ".join(axis.name for axis in axes)
+    asked = {"varied": named, "up_to": longest, "low": low, "high": high}
     return dataset, asked
 
 
@@ -79,10 +88,9 @@ def _places(values: Floats) -> Floats:
     return parts
 
 
-def _dataset(
-    raw: _core.BifurcationSet, axes: tuple[Varied, ...], speed: Floats, unit: str
-) -> xr.Dataset:
+def variables(raw: _core.BifurcationSet, axes: tuple[Varied, ...], units: Units) -> dict[str, Any]:
     """Return curves, their places and the points of codimension 2 as variables."""
+    speed, unit = units.given(raw.velocity, VELOCITY), units.of_velocity
     owner, at = raw.curve, raw.degenerate_place.astype(np.int64)
     words = np.array(raw.ends, dtype=str).reshape(-1, 2)
     meets = np.array(raw.meets, dtype=np.int32).reshape(-1, 2)
@@ -125,14 +133,15 @@ def _dataset(
         **{f"degenerate_{n}": ("degenerate", one[at], text) for n, (one, text) in values.items()},
         **result.point("degenerate", raw.theta[at], speed[at], unit, "degenerate_{}"),
     }
+    if not raw.sections:  # curves from points that were known
+        return data
     held, where, orbits, new = zip(*raw.sections, strict=True)
-    data |= {
+    return data | {
         "section_held": variable("section", np.array(held, np.int32), "1", "axis that is held"),
         "section_part": variable("section", np.array(where), "1", "where, from 0 to 1"),
         "section_orbits": variable("section", np.array(orbits, np.int32), "1", "orbits found"),
         "section_new": variable("section", np.array(new, np.int32), "1", "new curves"),
     }
-    return xr.Dataset(data)
 
 
 def summary(dataset: xr.Dataset) -> list[str]:
@@ -146,13 +155,21 @@ def summary(dataset: xr.Dataset) -> list[str]:
     lines = [
         f"{', '.join(of_kind) or 'No curves'} of orbits up to {dataset.attrs['up_to']} periods."
     ]
-    names = ("kind", "n", "w", *varied)
-    for kind, n, w, *values in rows(dataset, *(f"degenerate_{name}" for name in names)):
-        pairs = zip(varied, values, strict=True)
-        where = ", ".join(f"{name} = {value:.12g}" for name, value in pairs)
-        lines.append(f"{kind.replace('_', ' ')} of {n}:{w} at {where}.")
+    lines += degenerate_lines(dataset, varied)
     new = dataset["section_new"].values[::-1]
     quiet = int(np.argmax(new > 0)) if new.any() else new.size
     searched = counted(dataset.sizes["section"], "section")
     lines.append(f"Orbits were searched on {searched}; the last {quiet} had no new curve.")
+    return lines
+
+
+def degenerate_lines(dataset: xr.Dataset, varied: Sequence[str]) -> list[str]:
+    """Return a line for each point of codimension 2 of a result, if it has curves."""
+    if "degenerate_kind" not in dataset:
+        return []
+    lines, names = [], ("kind", "n", "w", *varied)
+    for kind, n, w, *values in rows(dataset, *(f"degenerate_{name}" for name in names)):
+        pairs = zip(varied, values, strict=True)
+        where = ", ".join(f"{name} = {value:.12g}" for name, value in pairs)
+        lines.append(f"{kind.replace('_', ' ')} of {n}:{w} at {where}.")
     return lines

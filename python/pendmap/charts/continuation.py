@@ -1,4 +1,4 @@
-"""Chart of branches of orbits: points against the parameter, and what happens on them."""
+"""Charts of branches of orbits over a parameter, and of their bifurcations over two."""
 
 from __future__ import annotations
 
@@ -7,15 +7,20 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from pendmap._core import Attractor
 from pendmap.analysis.result import rows
-from pendmap.charts import names, plane
+from pendmap.charts import names, palette, plane
 from pendmap.charts.chart import Axis, Chart, Panel, holding
-from pendmap.charts.marks import DASHED, INK, Line, Mark, Points
+from pendmap.charts.marks import DASHED, DOTTED, INK, NONE, Line, Mark, Points
 from pendmap.files import facts
 from pendmap.units import Units
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
     import xarray as xr
+
+    from pendmap.charts.marks import Floats
 
 _COLOURS: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
 _MARKERS: Final = {
@@ -24,13 +29,32 @@ _MARKERS: Final = {
     "symmetry_breaking": "^",
     "neimark_sacker": "D",
     **dict.fromkeys(("stick_onset", "grazing", "rest_boundary"), "v"),
+    "cusp": "s",
+    "generalised_doubling": "o",
+    "degenerate_symmetry_breaking": "^",
 }
+_DASHES: Final = {"fold": "-", "period_doubling": DASHED, "symmetry_breaking": DOTTED}
+_EMPTY: Final[dict[str, Any]] = {"fill": "#ffffff", "edge": INK, "edge_width": 1.0}
 
 
 def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> Chart:
-    """Return angles and velocities of the orbits: full lines if stable, broken ones if not."""
+    """Return angles and velocities of the orbits: full lines if stable, broken ones if not.
+
+    Over two parameters it has the curves in their plane.
+    """
     del cells
     a, name = facts(dataset), str(dataset.attrs["varied"])
+    if "curve_kind" in dataset:
+        both = name.split(", ")
+        ends = zip(np.ravel(a["low"]).tolist(), np.ravel(a["high"]).tolist(), strict=True)
+        of = (str(dataset[f"place_{one}"].attrs.get("units", "1")) for one in both)
+        sides = [
+            Axis(names.symbol(one, unit), pair)
+            for one, unit, pair in zip(both, of, ends, strict=True)
+        ]
+        panel = Panel("curves", "", *sides, bifurcation_set(dataset, both))
+        title = f"Bifurcations of orbits up to {a['up_to']} periods over {names.over(both)}"
+        return Chart(title, names.parameters(a, both), [[panel]], size=(7.4, 5.6)).only(layer)
     units = Units.of(a)
     theta = plane.angles(dataset, dataset["point_theta"].values)
     sides = names.phase_plane(theta, holding(dataset["point_velocity"].values), units)
@@ -70,6 +94,72 @@ def _marks(dataset: xr.Dataset, which: str) -> list[Mark]:
     for kind in dict.fromkeys(kinds.tolist()):
         at = kinds == kind
         place = dataset["event_value"].values[at], dataset[f"event_{which}"].values[at]
-        look = {"marker": _MARKERS[kind], "fill": "#ffffff", "edge": INK, "edge_width": 1.0}
-        marks.append(Points(*place, size=5.0, order=4.0, name=kind.replace("_", " "), **look))
+        marks.append(_events(kind, *place))
     return marks
+
+
+def _events(kind: str, x: Floats, y: Floats) -> Points:
+    """Return points at which something happens."""
+    look: dict[str, Any] = {"marker": _MARKERS[kind], "name": kind.replace("_", " ")}
+    return Points(x, y, size=5.0, order=4.0, **look, **_EMPTY)
+
+
+def bifurcation_set(
+    dataset: xr.Dataset,
+    over: Sequence[str],
+    colours: Mapping[str, str] | None = None,
+    to: Callable[[Floats], Floats] = np.asarray,
+    **look: Any,  # noqa: ANN401 (fields of a line)
+) -> list[Mark]:
+    """Return the curves in the plane of two parameters and the points of codimension 2.
+
+    Dashes say what happens; lines are thin where the orbits born there are subcritical. Colours are
+    those of the orbits' types, or are given for what happens. ``to`` maps points, shape (m, 2).
+    """
+    if "curve_kind" not in dataset:
+        return []
+    owner, super_ = (dataset[f"place_{name}"].values for name in ("curve", "supercritical"))
+    places, degenerate = (
+        to(np.stack([dataset[f"{which}_{name}"].values for name in over], axis=-1))
+        for which in ("place", "degenerate")
+    )
+    types: dict[str, str] = {}
+    kinds: list[str] = []
+    lines: list[Mark] = []
+    for number, (kind, n, w) in enumerate(rows(dataset, "curve_kind", "curve_n", "curve_w")):
+        mine = owner == number
+        name, colour = _type_of(dataset, mine, n, w)
+        if colours is not None:
+            colour = colours[kind]
+        types[name], thin = colour, super_[mine] == 0
+        kinds.append(kind)
+        for width, shown in ((1.5, ~thin), (0.6, thin)):
+            # A piece belongs to both looks at the point where it changes.
+            near = shown | np.roll(shown, 1) & (np.arange(shown.size) > 0)
+            at = np.where(near[:, None], places[mine], np.nan)
+            path = f"{name}/{kind}/{number}".replace(" ", "_").replace(":", "_")
+            of: dict[str, Any] = {"dash": _DASHES[kind], "width": width, "path": path}
+            if shown.any():
+                lines.append(Line(*at.T, colour=colour, **of, **look))
+                path += "_"
+    marks: list[Mark] = []
+    if colours is None:
+        marks += [Line(NONE, NONE, colour=types[name], name=name) for name in sorted(types)]
+    for kind in [one for one in _DASHES if one in kinds]:
+        shade, text = (colours or {}).get(kind, INK), kind.replace("_", " ")
+        marks.append(Line(NONE, NONE, colour=shade, dash=_DASHES[kind], name=text))
+    if (super_ == 0).any():
+        marks.append(Line(NONE, NONE, colour=INK, width=0.6, name="thin: subcritical"))
+    every = dataset["degenerate_kind"].values
+    at_kind = ((one, degenerate[every == one]) for one in dict.fromkeys(every.tolist()))
+    return [*marks, *lines, *(_events(kind, *at.T) for kind, at in at_kind)]
+
+
+def _type_of(dataset: xr.Dataset, mine: Any, n: int, w: int) -> tuple[str, str]:  # noqa: ANN401 (an array)
+    """Return the name and the colour of the orbits of a curve."""
+    name, one = f"{n}:{w}", Attractor("rotation" if w else "oscillation", n, w)
+    if (n, w) == (1, 0) and not dataset["place_velocity"].values[mine].any():
+        upright = np.cos(dataset["place_theta"].values[mine][0]) < 0
+        name = "inverted rest" if upright else "rest"
+        one = Attractor(name.replace(" ", "_"), 1)
+    return name, palette.on_white(palette.colour(one))

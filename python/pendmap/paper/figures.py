@@ -179,7 +179,7 @@ def _critical() -> xr.Dataset:
 
     omega = 1 / np.sqrt(np.linspace(*_SQUARES, _COLUMNS)[::-1])
     p_max, plane = _HIGHEST / _SQUARES[0], "e-alpha2"
-    return tongues(Pendulum(gamma=0.1), omega, p_max, plane=plane, inverted=False, refine=True)
+    return tongues(Pendulum(gamma=0.1), omega, p_max, plane=plane)
 
 
 def printed_table() -> tuple[list[str], list[list[str]]]:
