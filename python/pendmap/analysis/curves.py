@@ -59,7 +59,11 @@ def _varied(dataset: xr.Dataset) -> list[str]:
 
 
 def in_plane(
-    pendulum: Pendulum | Rig, axes: tuple[Varied, ...], longest: int, numerics: Numerics
+    pendulum: Pendulum | Rig,
+    axes: tuple[Varied, ...],
+    longest: int,
+    numerics: Numerics,
+    only: list[tuple[int, int]] | None = None,
 ) -> tuple[xr.Dataset, dict[str, Any]]:
     """Return the curves in the plane of two axes as variables, and what was asked."""
     bare, units = without_dimensions(pendulum)
@@ -67,7 +71,7 @@ def in_plane(
     first, second = ((_places(axis.values).tolist(), axis.kernel) for axis in axes)
     with core_errors():
         run = numerics.run
-        raw = _core.bifurcation_set(bare, (first, second), longest, run.workers, run.progress)
+        raw = _core.bifurcation_set(bare, (first, second), longest, only, run.workers, run.progress)
     dataset = _dataset(raw, axes, units.given(raw.velocity, VELOCITY), units.of_velocity)
     asked = {"varied": ", ".join(axis.name for axis in axes), "up_to": longest}
     return dataset, asked
