@@ -447,6 +447,7 @@ def bifurcation_set(
     model: Pendulum,
     axes: tuple[tuple[Sequence[float], _Range], tuple[Sequence[float], _Range]],
     longest: int,
+    only: Sequence[tuple[int, int]] | None,
     threads: int,
     progress: _Progress | None = None,
 ) -> BifurcationSet: ...

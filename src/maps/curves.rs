@@ -30,10 +30,12 @@ const LONGEST: usize = 16;
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// A request for curves.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Request {
     /// Longest period of orbits.
     pub longest: usize,
+    /// Periods and net turns of the orbits that are searched and whose curves are followed; none for all.
+    pub only: Option<Vec<(usize, i64)>>,
     /// Workers; 0 for one a processor.
     pub threads: usize,
 }
@@ -64,7 +66,7 @@ pub struct Curves {
 /// [`Error::Range`] for a number out of its range, [`Error::NotMappable`] for effects that a map cannot have,
 /// [`Error::Interrupted`] if `control` was cancelled.
 pub fn curves(course: &Course, request: &Request, control: &Control) -> Result<Curves, Error> {
-    let Request { longest, .. } = *request;
+    let longest = request.longest;
     if !(1..=LONGEST).contains(&longest) {
         let allowed = "a whole number from 1 to 16";
         return Err(Error::Range { name: "longest", value: longest as f64, allowed });
@@ -81,6 +83,12 @@ pub fn curves(course: &Course, request: &Request, control: &Control) -> Result<C
         found.sections.push(section);
     }
     Ok(found)
+}
+
+impl Request {
+    fn wants(&self, n: usize, w: i64) -> bool {
+        self.only.as_ref().is_none_or(|types| types.contains(&(n, w)))
+    }
 }
 
 impl Curves {
@@ -104,6 +112,9 @@ impl Curves {
                 let turns = (fastest * n as f64 / pendulum.drive.omega).floor() as i64;
                 for w in if mirrored { 0 } else { -turns }..=turns {
                     control.check()?;
+                    if !request.wants(n, w) {
+                        continue;
+                    }
                     let window = window(&pendulum, (n, w), CELLS * n, request.threads)?;
                     for orbit in &orbits::orbits(&pendulum, &window, control)?.closed {
                         section.orbits += 1;
@@ -111,7 +122,7 @@ impl Curves {
                             family.add(orbit, at, control.flag())?;
                         }
                     }
-                    section.new += self.add(&family, known, axis, held.1, control)?;
+                    section.new += self.add(&family, known, (axis, held.1), request, control)?;
                     known = family.branches.len();
                 }
             }
@@ -124,12 +135,15 @@ impl Curves {
         &mut self,
         family: &Family,
         from: usize,
-        axis: usize,
-        held: f64,
+        (axis, held): (usize, f64),
+        request: &Request,
         control: &Control,
     ) -> Result<usize, Error> {
         let before = self.plane.curves.len();
         for branch in &family.branches[from..] {
+            if !request.wants(branch.of.n, branch.of.w) {
+                continue;
+            }
             let cycles = family.cycles(branch.of);
             for event in branch.run.events.iter().filter(|event| event.smooth) {
                 if !matches!(event.kind, Kind::Fold | Kind::PeriodDoubling | Kind::SymmetryBreaking)

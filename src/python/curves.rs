@@ -44,14 +44,16 @@ pub struct BifurcationSet {
     sections: Vec<(usize, f64, usize, usize)>,
 }
 
-/// Curves of folds, period doublings and symmetry breakings of orbits up to the period `longest` in the plane of two axes.
+/// Curves of folds, period doublings and symmetry breakings of orbits up to the period `longest` in the plane of two axes;
+/// `only` some periods and net turns.
 #[pyfunction]
-#[pyo3(signature = (model, axes, longest, threads, progress=None))]
+#[pyo3(signature = (model, axes, longest, only, threads, progress=None))]
 pub fn bifurcation_set(
     py: Python<'_>,
     model: Model,
     axes: (Axis, Axis),
     longest: usize,
+    only: Option<Vec<(usize, i64)>>,
     threads: usize,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<BifurcationSet> {
@@ -64,7 +66,7 @@ pub fn bifurcation_set(
     };
     let axes = vec![axis(axes.0).map_err(raise)?, axis(axes.1).map_err(raise)?];
     let course = Course { base, axes };
-    let request = Request { longest, threads };
+    let request = Request { longest, only, threads };
     let found = interruptible(py, progress.as_ref(), |control| search(&course, &request, control))?;
     BifurcationSet::new(py, &found.plane, &found.sections)
 }

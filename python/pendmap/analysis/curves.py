@@ -62,7 +62,11 @@ def _varied(dataset: xr.Dataset) -> list[str]:
 
 
 def in_plane(
-    pendulum: Pendulum | Rig, axes: tuple[Varied, ...], longest: int, numerics: Numerics
+    pendulum: Pendulum | Rig,
+    axes: tuple[Varied, ...],
+    longest: int,
+    numerics: Numerics,
+    only: list[tuple[int, int]] | None = None,
 ) -> tuple[xr.Dataset, dict[str, Any]]:
     """Return the curves in the plane of two axes as variables, and what was asked."""
     bare, units = without_dimensions(pendulum)
@@ -74,7 +78,7 @@ def in_plane(
     first, second = ((_places(axis.values).tolist(), axis.kernel) for axis in axes)
     with core_errors():
         run = numerics.run
-        raw = _core.bifurcation_set(bare, (first, second), longest, run.workers, run.progress)
+        raw = _core.bifurcation_set(bare, (first, second), longest, only, run.workers, run.progress)
     dataset = xr.Dataset(variables(raw, axes, units))
     low, high = ([float(axis.values[end]) for axis in axes] for end in (0, -1))
     named = ", ".join(axis.name for axis in axes)
