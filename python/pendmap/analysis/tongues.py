@@ -22,7 +22,7 @@ from pendmap import _core
 from pendmap.analysis import curves, grid, result, varied
 from pendmap.analysis.result import Field, Found, Schema, summarised
 from pendmap.analysis.run import Numerics, RunOptions
-from pendmap.errors import InputError, check_number, core_errors, short_repr
+from pendmap.errors import check_number, core_errors
 from pendmap.files import facts
 from pendmap.files.variables import NO_YES, flag, variable
 from pendmap.formatting import counted, listed
@@ -38,8 +38,6 @@ if TYPE_CHECKING:
     from pendmap.model import Pendulum, Rig
     from pendmap.signal import Floats
 
-PLANES = ("omega-p", "e-alpha2")
-"""Eq. 1.2's ``(omega, p)``, and eq. 1.4's ``(alpha^2, e) = (1/omega^2, p/omega^2)``."""
 OMEGA = (0.5, 3.0, 200)  # Default frequencies
 _OF_P = "1", "amplitude of the drive over gravity"  # Unit and meaning of p
 _STABLE = {0: "unstable", 1: "stable"}  # Meanings of a flag
@@ -83,7 +81,6 @@ SCHEMA = Schema(
     Field("p_max", "1", "largest amplitude that was looked at"),
     *result.TIMED,
     *result.END,
-    Field("plane", "", "plane of the figure: omega-p or e-alpha2", json=False),
     Found("moved", result.FLAG, "whether a torque makes an orbit of rest", json=False),
     Found("inverted_rest", result.FLAG, "whether upright is a rest", json=False),
     *result.OWN,
@@ -96,7 +93,6 @@ def tongues(
     omega: ArrayLike | None = None,
     p_max: float = 6.0,
     *,
-    plane: str = "omega-p",
     run: RunOptions | None = None,
     **options: Unpack[Keywords],
 ) -> xr.Dataset:
@@ -107,7 +103,8 @@ def tongues(
     there is its monodromy matrix ``M``, and rest changes its stability where a multiplier passes
     +1, ``1 - tr M + det M = 0``, or -1, ``1 + tr M + det M = 0``. These are events on the branch of
     rest over ``p``, as those of :func:`pendmap.continuation`: symmetry breakings and period
-    doublings. In the plane of eq. 1.4 a point is ``(e, alpha^2) = (p/omega^2, 1/omega^2)``.
+    doublings. A figure has the plane of eq. 1.2, or as its layer ``e-alpha2`` that of eq. 1.4,
+    ``(e, alpha^2) = (p/omega^2, 1/omega^2)``.
 
     The curves through the events are followed in the plane, with the points at which they change
     between super- and subcritical, and with the folds of the oscillations born toward smaller
@@ -122,12 +119,9 @@ def tongues(
         The model; its own ``p``, ``omega`` and phase do not matter. With gamma = 0 the curves are
         those of Mathieu's equation. Effects are included; rest must be a solution.
     omega : array_like, optional
-        Frequencies ``Omega/w0`` in ascending order, by default 200 from 0.5 to 3,
-        evenly in omega or, for the plane of eq. 1.4, in 1/omega^2.
+        Frequencies ``Omega/w0`` in ascending order, by default 200 from 0.5 to 3.
     p_max : float
         Largest amplitude, up to 50,000 times the square of the lowest frequency.
-    plane : str
-        Plane of a figure: ``omega-p`` of eq. 1.2, or ``e-alpha2`` of eq. 1.4.
     run : RunOptions, optional
         As for :func:`pendmap.basins`.
 
@@ -157,21 +151,9 @@ def tongues(
     0.2
     """
     bare, units = without_dimensions(pendulum)
-    if omega is None:  # evenly spread in the plane
-        low, high, count = OMEGA
-        omega = np.linspace(*OMEGA)
-        if plane != PLANES[0]:
-            omega = 1 / np.sqrt(np.linspace(1 / low**2, 1 / high**2, count))
-    omega, p_max = grid.frequencies(omega), check_number("p_max", p_max)
-    run = RunOptions.of(run, options).in_memory("tongues")
+    omega = grid.frequencies(np.linspace(*OMEGA) if omega is None else omega)
+    p_max, run = check_number("p_max", p_max), RunOptions.of(run, options).in_memory("tongues")
     numerics = Numerics(run)
-    if plane not in PLANES:
-        raise InputError(f"plane must be one of {', '.join(PLANES)}, got {short_repr(plane)}")
-    if bare.theta_r > 0:
-        raise InputError(
-            f"theta_r must be 0, got {bare.theta_r:g}: friction holds hanging rest whatever "
-            "the drive, and it never loses its stability"
-        )
     with core_errors():
         raw = _core.tongues(bare, omega.tolist(), p_max, run.workers, run.progress)
     by_perturbation = np.array([formula(omega, bare.gamma) for _, formula in CURVES.values()])
@@ -203,7 +185,6 @@ def tongues(
         dataset = dataset.assign(curves.variables(raw.curves, axes, units))
     values = {
         **numerics.provenance(),
-        "plane": plane,
         "p_max": p_max,
         "moved": int(bare.torque != 0),
         "inverted_rest": int(raw.upright),
@@ -220,35 +201,30 @@ def _summary(dataset: xr.Dataset) -> list[str]:
     a, omega = facts(dataset), dataset["omega"].values
     names = ("inverted", "p", "omega", "stable_above")
     every = list(result.rows(dataset, *(f"critical_{name}" for name in names)))
-    hanging = [row[1:] for row in every if not row[0]]
     rest = "the orbit about {} rest" if a["moved"] else "{} rest"
+    hanging, inverted = (rest.format(which) for which in ("hanging", "inverted"))
+    lost = [(p, f"omega = {at:.6g}: p = {p:.9g}") for up, p, at, _ in every if not up]
+    number = counted(len(lost), "critical amplitude")
     where = f"{counted(omega.size, 'value')} of omega from {omega[0]:g} to {omega[-1]:g}"
-    number = counted(len(hanging), "critical amplitude")
     lines = [f"{number} up to p = {a['p_max']:g} at {where}."]
     never = omega[dataset["stable_at_first"].values == 0]
     if never.size:
-        omegas = listed([f"{value:.6g}" for value in never], 3)
-        who = rest.format("hanging").capitalize()
-        lines.append(f"{who} is unstable from p = 0 on at omega = {omegas}.")
-    elif hanging:
-        p, at, _ = min(hanging)
-        soonest = f"soonest at omega = {at:.6g}: p = {p:.9g}"
-        who = rest.format("hanging")
-        lines.append(f"Of these frequencies {who} loses its stability {soonest}.")
+        at = listed([f"{value:.6g}" for value in never], 3)
+        lines.append(f"{hanging.capitalize()} is unstable from p = 0 on at omega = {at}.")
+    elif lost:
+        soonest = f"soonest at {min(lost)[1]}"
+        lines.append(f"Of these frequencies {hanging} loses its stability {soonest}.")
     lines += curves.degenerate_lines(dataset, ("p", "omega"))
+    gained = [(p, f"p = {p:.9g} on at omega = {at:.6g}") for up, p, at, yes in every if up and yes]
     if a["inverted_rest"]:
-        stable = [row[1:3] for row in every if row[0] and row[3]]
-        p, at = min(stable, default=(0.0, 0.0))
-        lowest = f"from p = {p:.9g} on at omega = {at:.6g}, the lowest"
-        who = rest.format("inverted").capitalize()
-        lines.append(f"{who} is stable {lowest if stable else 'nowhere there'}.")
+        lowest = f"from {min(gained)[1]}, the lowest" if gained else "nowhere there"
+        lines.append(f"{inverted.capitalize()} is stable {lowest}.")
     return [*lines, f"{a['seconds']:.2f} s on {counted(a['threads'], 'thread')}."]
 
 
 def first_tongue(omega: Floats, gamma: float) -> Floats:
     """Return critical ``p`` of the first tongue to first order; nan nearer to the second tongue."""
-    a, c = 1 - omega**2 / 4, gamma * omega / 2
-    return np.where(omega > 1.0, 2 * np.hypot(a, c), np.nan)
+    return np.where(omega > 1.0, 2 * np.hypot(1 - omega**2 / 4, gamma * omega / 2), np.nan)
 
 
 def first_tongue_second_order(omega: Floats, gamma: float) -> Floats:
@@ -257,11 +233,10 @@ def first_tongue_second_order(omega: Floats, gamma: float) -> Floats:
     with np.errstate(divide="ignore", invalid="ignore"):
         k = 1 / (9 * omega**2 - 4)
         # k^2 P^2 + (2 a k - 1/4) P + a^2 + c^2 = 0 in P = p^2: the root that is finite for k = 0.
-        half = 1 / 8 - a * k
-        square = (a**2 + c**2) / (half + np.sqrt(half**2 - k**2 * (a**2 + c**2)))
-        amplitude = np.sqrt(square)
+        half, last = 1 / 8 - a * k, a**2 + c**2
+        p = np.sqrt(last / (half + np.sqrt(half**2 - k**2 * last)))
     # Left of 2/3 the third harmonic is resonant before the first.
-    return np.where((omega > 1.0) & np.isfinite(amplitude), amplitude, np.nan)
+    return np.where((omega > 1.0) & np.isfinite(p), p, np.nan)
 
 
 def second_tongue(omega: Floats, gamma: float) -> Floats:
@@ -270,11 +245,10 @@ def second_tongue(omega: Floats, gamma: float) -> Floats:
     with np.errstate(divide="ignore", invalid="ignore"):
         s = 1 / (4 * (4 * omega**2 - 1))
         # s (1/2 - s) P^2 + a (1/2 - 2 s) P - (a^2 + c^2) = 0.
-        leading, half = s * (0.5 - s), a * (0.5 - 2 * s) / 2
-        square = (-half + np.sqrt(half**2 + leading * (a**2 + c**2))) / leading
-        amplitude = np.sqrt(square)
+        leading, half = s * (0.5 - s), a * (0.25 - s)
+        p = np.sqrt((np.sqrt(half**2 + leading * (a**2 + c**2)) - half) / leading)
     # Left of 1/sqrt(2) the second harmonic is nearly resonant itself.
-    return np.where((omega > np.sqrt(0.5)) & np.isfinite(amplitude), amplitude, np.nan)
+    return np.where((omega > np.sqrt(0.5)) & np.isfinite(p), p, np.nan)
 
 
 CURVES: dict[str, tuple[int, Callable[[Floats, float], Floats]]] = {

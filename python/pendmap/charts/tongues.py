@@ -46,9 +46,7 @@ def chart(
 ) -> Chart:
     """Return the critical curves in both planes; a figure shows one of them."""
     del cells
-    first = str(dataset.attrs.get("plane"))
-    order = sorted(_PLANES, key=lambda plane: plane != first)
-    panels = [_panel(dataset, plane, marks) for plane in order]
+    panels = [_panel(dataset, plane, marks) for plane in _PLANES]
     return Chart(
         title,
         names.parameters({k: v for k, v in facts(dataset).items() if k not in _DRIVE}),

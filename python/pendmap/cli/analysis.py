@@ -177,9 +177,9 @@ _ENTRIES: Final = {
         """,
         (
             "pendmap tongues --omega 0.5:3:200 --p-max 6",
-            "pendmap tongues --gamma 0 --plane e-alpha2 --out mathieu.pdf",
+            "pendmap tongues --gamma 0 --omega 0.6:2:80 --out mathieu.pdf",
         ),
-        example="--p-max 6 --plane e-alpha2",
+        example="--p-max 6",
         further=(
             option(
                 "--omega omegas",

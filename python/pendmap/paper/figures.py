@@ -156,7 +156,8 @@ def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
     title = f"{number}: {FIGURES[key][0].lower()}{FIGURES[key][1:]}"
     if key == "1":
         marks = [(one.p, one.omega, name[-1]) for name, one in sorted(PRESETS.items())]
-        return render.draw(tongues.chart(_critical(), title=title, marks=marks), path)
+        chart = tongues.chart(_critical(), layer="e-alpha2", title=title, marks=marks)
+        return render.draw(chart, path)
     if key == "2":
         return render.draw(tumbling_chart(tumbling(), title), path)
     if key == "3":
@@ -178,8 +179,7 @@ def _critical() -> xr.Dataset:
     from pendmap.model import Pendulum  # noqa: PLC0415
 
     omega = 1 / np.sqrt(np.linspace(*_SQUARES, _COLUMNS)[::-1])
-    p_max, plane = _HIGHEST / _SQUARES[0], "e-alpha2"
-    return tongues(Pendulum(gamma=0.1), omega, p_max, plane=plane)
+    return tongues(Pendulum(gamma=0.1), omega, _HIGHEST / _SQUARES[0])
 
 
 def printed_table() -> tuple[list[str], list[list[str]]]:
