@@ -142,7 +142,7 @@ impl Cycles<'_> {
                 (length, refused) = (FIRST, None);
                 continue;
             }
-            match self.step(&here, length, &mut refused) {
+            match self.step(&run.orbits, length, &mut refused) {
                 Step::Long(factor) => length *= factor,
                 Step::Over(end, last) => {
                     if let Some(last) = last {
@@ -219,9 +219,11 @@ impl Cycles<'_> {
         None
     }
 
-    /// One step; `refused` keeps why the last one was.
-    fn step(&self, here: &Orbit, length: f64, refused: &mut Option<End>) -> Step {
-        let guess = &here.place + &here.tangent * length;
+    /// One step from the last of the orbits; `refused` keeps why the last one was.
+    fn step(&self, orbits: &[Orbit], length: f64, refused: &mut Option<End>) -> Step {
+        let here = &orbits[orbits.len() - 1];
+        let before = orbits.iter().nth_back(1).filter(|before| before.is_like(here));
+        let guess = predicted(before, here, length);
         let Some(next) = self.near(&guess, &here.tangent) else {
             *refused = None;
             return Step::Long(CHANGE[0]);
@@ -302,6 +304,17 @@ impl Cycles<'_> {
         let first = self.points(&a.place)[0];
         self.all_points(&b.place).iter().any(|point| angle.distance(*point, first) < SAME)
     }
+}
+
+/// The place at a distance from an orbit along the tangent, with the curvature since the one before.
+pub(super) fn predicted(before: Option<&Orbit>, here: &Orbit, length: f64) -> DVector<f64> {
+    let mut guess = &here.place + &here.tangent * length;
+    if let Some(before) = before {
+        let turn = &here.tangent - &before.tangent;
+        let past = (&here.place - &before.place).norm();
+        guess += turn * (0.5 * length * length / past.max(length));
+    }
+    guess
 }
 
 /// A part of the way between two orbits, by Hermite's cubic.

@@ -138,9 +138,10 @@ impl Critical<'_> {
         &self,
         place: &DVector<f64>,
         border: Option<&Border>,
+        steps: usize,
     ) -> Option<(System, Border, f64)> {
         let at = Self::at(place);
-        let map = Period::<4>::new(self.cycles.course, &at);
+        let map = Period::<4>::new(self.cycles.course, &at).by(steps);
         let points = self.points(place);
         let (count, moving, root) = (points.len(), self.moving(), self.cycles.root());
         let images = self.images(&map, std::slice::from_ref(&points)).pop()?;
@@ -210,12 +211,13 @@ impl Critical<'_> {
         row: &DVector<f64>,
         border: Option<&Border>,
     ) -> Option<Point> {
+        let steps = Period::<4>::count(self.cycles.course, &Self::at(guess));
         let mut place = guess.clone();
         let mut before = f64::INFINITY;
         let mut kept = border.cloned();
         let far = usize::from(border.is_none());
         for _ in 0..ITERATIONS[far] {
-            let (system, vectors, bend) = self.system(&place, kept.as_ref())?;
+            let (system, vectors, bend) = self.system(&place, kept.as_ref(), steps)?;
             let size = place.amax().max(1.0);
             let rounding = ROUNDING * (1.0 + system.norm) * size;
             let gap = system.gap.amax();
@@ -244,7 +246,8 @@ impl Critical<'_> {
 
     /// The point at a place where the curve is not alone, with the null vector for a tangent.
     pub(super) fn degenerate(&self, place: &DVector<f64>) -> Option<Point> {
-        let (system, border, coefficient) = self.system(place, None)?;
+        let steps = Period::<4>::count(self.cycles.course, &Self::at(place));
+        let (system, border, coefficient) = self.system(place, None, steps)?;
         let [_, right] = border.vectors();
         let tangent = right.clone().resize_vertically(place.len(), 0.0);
         let orbit = self.cycles.finished(place.clone(), &system, tangent, true, 0.0);

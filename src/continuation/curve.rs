@@ -9,7 +9,7 @@ use std::sync::atomic::AtomicBool;
 
 use nalgebra::DVector;
 
-use super::branch::{End, SAME, interpolated};
+use super::branch::{End, SAME, interpolated, predicted};
 use super::critical::{Critical, Point};
 use super::cycle::Type;
 use super::event::Kind;
@@ -149,12 +149,8 @@ impl Critical<'_> {
         refused: &mut Option<End>,
     ) -> Result<(Point, f64), f64> {
         let here = &points[points.len() - 1];
-        let mut guess = &here.orbit.place + &here.orbit.tangent * length;
-        if let [.., before, _] = points {
-            let turn = &here.orbit.tangent - &before.orbit.tangent;
-            let past = (&here.orbit.place - &before.orbit.place).norm();
-            guess += turn * (0.5 * length * length / past.max(length));
-        }
+        let before = points.iter().nth_back(1).map(|point| &point.orbit);
+        let guess = predicted(before, &here.orbit, length);
         let found = self.near(&guess, &here.orbit.tangent, Some(&here.border));
         let Some(mut next) = found else {
             *refused = None;

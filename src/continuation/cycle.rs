@@ -173,9 +173,9 @@ impl Cycles<'_> {
         }
     }
 
-    fn system(&self, place: &DVector<f64>) -> Option<System> {
+    fn system(&self, place: &DVector<f64>, count: usize) -> Option<System> {
         let at = self.at(place);
-        let map = Period::<3>::new(self.course, &[at]);
+        let map = Period::<3>::new(self.course, &[at]).by(count);
         let mut points = self.points(place);
         if map.rubs() {
             for point in points.iter_mut().filter(|point| point[1].abs() < STILL) {
@@ -216,14 +216,15 @@ impl Cycles<'_> {
     /// of `row`.
     #[must_use]
     pub fn near(&self, guess: &DVector<f64>, row: &DVector<f64>) -> Option<Orbit> {
+        let steps = self.steps(guess);
         if self.of.closure == Closure::Rest {
-            let system = self.system(guess)?;
+            let system = self.system(guess, steps)?;
             return self.complete(guess.clone(), &system, row, 0.0);
         }
         let mut place = guess.clone();
         let mut before = f64::INFINITY;
         for _ in 0..ITERATIONS {
-            let system = self.system(&place)?;
+            let system = self.system(&place, steps)?;
             let size = place.amax().max(1.0);
             let rounding = ROUNDING * (1.0 + system.norm) * size;
             let gap = system.gap.amax();
@@ -249,14 +250,19 @@ impl Cycles<'_> {
 
     /// What the system is at a place where it does not close, with the direction of its kernel.
     pub(super) fn open(&self, place: &DVector<f64>, row: &DVector<f64>) -> Option<Orbit> {
-        self.complete(place.clone(), &self.system(place)?, row, 0.0)
+        self.complete(place.clone(), &self.system(place, self.steps(place))?, row, 0.0)
     }
 
     /// The orbit at a place where it closes, without its direction along a branch.
     #[must_use]
     pub fn unfollowed(&self, place: &DVector<f64>) -> Option<Orbit> {
-        let system = self.system(place)?;
+        let system = self.system(place, self.steps(place))?;
         Some(self.finished(place.clone(), &system, self.along(), true, 0.0))
+    }
+
+    /// Equal steps of a period there.
+    fn steps(&self, place: &DVector<f64>) -> usize {
+        Period::<3>::count(self.course, &[self.at(place)])
     }
 
     fn complete(

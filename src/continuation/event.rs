@@ -10,10 +10,13 @@
 
 use super::branch::{Run, interpolated};
 use super::cycle::{Closure, Cycles, Orbit};
+use crate::orbit::poincare::STEP;
 
 /// Refinements of a zero at most, and the part of a step at which it is known.
 const REFINEMENTS: usize = 40;
 const EXACT: f64 = 1e-14;
+/// The same where steps are too long for that.
+const ROUGH: f64 = 1e-9;
 /// Relative difference of equal entries.
 const EVEN: f64 = 1e-9;
 
@@ -211,9 +214,10 @@ fn zero(cycles: &Cycles<'_>, a: &Orbit, b: &Orbit, test: Test) -> Option<Orbit> 
     let mut ends = [(0.0, test(cycles, a)), (1.0, test(cycles, b))];
     let mut best: Option<(f64, Orbit)> = None;
     let mut stayed = None;
+    let exact = if cycles.course.step > STEP { ROUGH } else { EXACT };
     for _ in 0..REFINEMENTS {
         let [(low, at_low), (high, at_high)] = ends;
-        if high - low < EXACT {
+        if high - low < exact {
             break;
         }
         let part = (low * at_high - high * at_low) / (at_high - at_low);
@@ -222,7 +226,7 @@ fn zero(cycles: &Cycles<'_>, a: &Orbit, b: &Orbit, test: Test) -> Option<Orbit> 
         let (part, orbit) = at(part).or_else(|| at(0.5 * (low + high)))?;
         let value = test(cycles, &orbit);
         let side = usize::from(value.signum() != at_low.signum());
-        let known = (part - ends[side].0).abs() < EXACT;
+        let known = (part - ends[side].0).abs() < exact;
         ends[side] = (part, value);
         if stayed == Some(side) {
             ends[1 - side].1 *= 0.5;

@@ -18,8 +18,10 @@ use super::period::{Image, Period};
 /// The longest displacement along the null vector, and its halvings at most: until the differences at it and at half of it
 /// are this near to one another, over the size of what is projected on `w`.
 const BESIDE: f64 = 0.032;
-const HALVINGS: i32 = 12;
+const HALVINGS: usize = 12;
 const ALIKE: f64 = 0.02;
+/// Displacements that are tried at once, to fill the lanes.
+const BATCH: usize = 4;
 /// The part of that displacement at which the coefficient is precise.
 const PRECISE: f64 = 0.125;
 /// A product of the null vectors below this is 0.
@@ -40,49 +42,70 @@ impl Critical<'_> {
     /// The coefficient `w v c`; none where the sequence of phases changes nearby.
     #[must_use]
     pub fn cubic(&self, point: &Point, precise: bool) -> Option<f64> {
-        let at = |distance: f64, weights: &[f64]| self.cubic_within(point, distance, weights);
         let mut before: Option<f64> = None;
-        for k in 0..HALVINGS {
-            let distance = BESIDE * 0.5_f64.powi(k);
-            let Some([here, size]) = at(distance, &[1.0]) else { continue };
-            if before.is_some_and(|before| (here - before).abs() < ALIKE * size) {
-                let found = if precise { at(PRECISE * distance, &WEIGHTS)?[0] } else { here };
-                return Some(found);
+        for batch in 0..HALVINGS / BATCH {
+            let halved = |k: usize| BESIDE * 0.5_f64.powi((batch * BATCH + k) as i32);
+            let distances: [f64; BATCH] = std::array::from_fn(halved);
+            let laps = self.displaced(point, &distances);
+            for (distance, laps) in distances.iter().zip(&laps) {
+                let laps = std::slice::from_ref(laps);
+                let Some([here, size]) = self.cubic_within(point, &[*distance], laps, &[1.0])
+                else {
+                    continue;
+                };
+                if before.is_some_and(|before| (here - before).abs() < ALIKE * size) {
+                    if !precise {
+                        return Some(here);
+                    }
+                    let distances = [1.0, 2.0, 3.0].map(|k| k * PRECISE * distance);
+                    let laps = self.displaced(point, &distances);
+                    return Some(self.cubic_within(point, &distances, &laps, &WEIGHTS)?[0]);
+                }
+                before = Some(here);
             }
-            before = Some(here);
         }
         None
     }
 
-    /// The coefficient by differences at a distance, and the size of what is projected on `w`.
-    fn cubic_within(&self, point: &Point, distance: f64, weights: &[f64]) -> Option<[f64; 2]> {
+    /// The images of points displaced by distances along the null vector and against it.
+    fn displaced(&self, point: &Point, distances: &[f64]) -> Vec<[Vec<Image>; 2]> {
         let place = &point.orbit.place;
-        let [left, right] = point.border.vectors();
+        let [_, right] = point.border.vectors();
         let points = self.points(place);
         let map = Period::<4>::new(self.cycles.course, &Self::at(place));
-        let by = |k: usize| distance * (k + 1) as f64;
-        let laps: Vec<_> = (0..weights.len())
-            .flat_map(|k| [by(k), -by(k)])
-            .map(|by| Self::beside(&points, right, by))
-            .collect();
-        let images = self.images(&map, &laps);
+        let both = distances.iter().flat_map(|by| [*by, -by]);
+        let laps: Vec<_> = both.map(|by| Self::beside(&points, right, by)).collect();
+        let mut images = self.images(&map, &laps).into_iter();
+        let pair = |_| images.next().zip(images.next()).map(|(above, below)| [above, below]);
+        distances.iter().filter_map(pair).collect()
+    }
+
+    /// The coefficient by differences at some distances, and the size of what is projected on `w`.
+    fn cubic_within(
+        &self,
+        point: &Point,
+        distances: &[f64],
+        laps: &[[Vec<Image>; 2]],
+        weights: &[f64],
+    ) -> Option<[f64; 2]> {
+        let [left, right] = point.border.vectors();
         let phases =
             |lap: &[Image]| lap.iter().map(|image| image.phases.clone()).collect::<Vec<_>>();
-        let own = phases(&images[0]);
-        if images.iter().any(|lap| phases(lap) != own) {
+        let own = phases(&laps[0][0]);
+        if laps.iter().flatten().any(|lap| phases(lap) != own) {
             return None;
         }
         // Of each part, the first derivatives' derivative along `v`, and the second one.
-        let (factors, count) = (self.factors(), points.len());
+        let (factors, count) = (self.factors(), point.orbit.parts.len());
         let mut first = vec![Matrix2::zeros(); count];
         let mut second = vec![Matrix2::zeros(); count];
-        for (k, weight) in weights.iter().enumerate() {
+        for ((by, pair), weight) in distances.iter().zip(laps).zip(weights) {
             let shares = first.iter_mut().zip(&mut second).enumerate();
             for (i, (first, second)) in shares {
-                let [above, below] = [2 * k, 2 * k + 1].map(|lap| images[lap][i].by_state);
+                let [above, below] = [0, 1].map(|side| pair[side][i].by_state);
                 let twice = point.orbit.parts[i] * 2.0;
-                *first += (above - below) * (weight * factors[i] / (2.0 * by(k)));
-                *second += (above - twice + below) * (weight * factors[i] / by(k).powi(2));
+                *first += (above - below) * (weight * factors[i] / (2.0 * by));
+                *second += (above - twice + below) * (weight * factors[i] / by.powi(2));
             }
         }
         let of = |vector: &DVector<f64>, i: usize| Vector2::new(vector[2 * i], vector[2 * i + 1]);

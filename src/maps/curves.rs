@@ -5,25 +5,27 @@
 //! their branches is a point of a curve, which is followed if none passes there yet, until several sections in a row have
 //! had no new one.
 
-use super::branches::window;
 use super::control::Control;
-use super::orbits;
+use super::every_orbit::every_orbit;
 use crate::continuation::branch::Bounds;
 use crate::continuation::course::Course;
 use crate::continuation::event::Kind;
 use crate::continuation::family::Family;
 use crate::continuation::plane::{Plane, Seed};
 use crate::error::Error;
-use crate::model::pendulum::Symmetry;
 
 /// Sections at least, at most, and in a row without a new curve.
 const LEAST: usize = 6;
-const MOST: usize = 40;
-const QUIET: usize = 4;
+const MOST: usize = 12;
+const QUIET: usize = 2;
+/// Distance of the first sections from the edges.
+const EDGE: f64 = 1e-3;
 /// Places along a section at which orbits are searched.
-const PLACES: [f64; 2] = [0.31, 0.83];
-/// Cells along a side of the box of a search, a period.
-const CELLS: usize = 60;
+const PLACES: [f64; 3] = [0.95, 0.5, 0.2];
+/// Lengths of steps, in units of the fastest small oscillation, of curves and of what they are begun from: they err by 1e-12
+/// and 1e-10 in a few periods.
+const STEP: f64 = 0.04;
+const SEED_STEP: f64 = 0.06;
 /// The longest period of a request.
 const LONGEST: usize = 16;
 /// The golden section.
@@ -71,18 +73,29 @@ pub fn curves(course: &Course, request: &Request, control: &Control) -> Result<C
         let allowed = "a whole number from 1 to 16";
         return Err(Error::Range { name: "longest", value: longest as f64, allowed });
     }
-    let mut found = Curves { plane: Plane::new(course.clone(), longest)?, sections: Vec::new() };
+    let mut found =
+        Curves { plane: Plane::new(course.clone().by(STEP), longest)?, sections: Vec::new() };
     let mut quiet = 0;
     for k in 0..MOST {
         if k >= LEAST && quiet >= QUIET {
             break;
         }
-        let held = (1 - k % 2, (0.5 + GOLDEN * (k / 2) as f64).fract());
-        let section = found.search(held, request, control)?;
+        let section = found.search(section(k), request, control)?;
         quiet = if section.new > 0 { 0 } else { quiet + 1 };
         found.sections.push(section);
     }
     Ok(found)
+}
+
+/// The coordinate held on a section, and its value: the edges first, where all curves end that do not end within.
+fn section(k: usize) -> (usize, f64) {
+    match k {
+        0 => (1, 1.0 - EDGE),
+        1 => (0, 1.0 - EDGE),
+        2 => (1, EDGE),
+        3 => (0, EDGE),
+        _ => (1 - k % 2, (0.5 + GOLDEN * ((k - 4) / 2) as f64).fract()),
+    }
 }
 
 impl Request {
@@ -100,32 +113,40 @@ impl Curves {
         control: &Control,
     ) -> Result<Section, Error> {
         let axis = 1 - held.0;
-        let course = self.plane.course.along(axis, held.1);
+        let course = self.plane.course.along(axis, held.1).by(SEED_STEP);
         let mut family = Family::new(course, Bounds { low: 0.0, high: 1.0 }, request.longest)?;
         let mut section = Section { held, orbits: 0, new: 0 };
-        let mut known = 0;
+        let t0 = std::time::Instant::now();
+        let (mut ts, mut tf) = (0.0, 0.0);
         for at in PLACES {
             let pendulum = family.pendulum(at);
-            let mirrored = self.plane.symmetry == Some(Symmetry::AtOnce);
-            for n in 1..=request.longest {
-                let fastest = 2.0 * (1.0 + pendulum.drive.p.abs()).sqrt();
-                let turns = (fastest * n as f64 / pendulum.drive.omega).floor() as i64;
-                for w in if mirrored { 0 } else { -turns }..=turns {
-                    control.check()?;
-                    if !request.wants(n, w) {
-                        continue;
-                    }
-                    let window = window(&pendulum, (n, w), CELLS * n, request.threads)?;
-                    for orbit in &orbits::orbits(&pendulum, &window, control)?.closed {
-                        section.orbits += 1;
-                        if !family.passes(orbit, at) {
-                            family.add(orbit, at, control.flag())?;
-                        }
-                    }
-                    section.new += self.add(&family, known, (axis, held.1), request, control)?;
-                    known = family.branches.len();
+            let t = std::time::Instant::now();
+            let all = every_orbit(&pendulum, request.longest, request.threads, control)?;
+            ts += t.elapsed().as_secs_f64();
+            let t = std::time::Instant::now();
+            for orbit in all.iter().filter(|orbit| request.wants(orbit.n, orbit.w)) {
+                section.orbits += 1;
+                if !family.passes(orbit, at) {
+                    family.add(orbit, at, control.flag())?;
                 }
             }
+            tf += t.elapsed().as_secs_f64();
+        }
+        let t = std::time::Instant::now();
+        section.new = self.add(&family, (axis, held.1), request, control)?;
+        if std::env::var("CV_DEBUG").is_ok() {
+            let steps: usize = family.branches.iter().map(|b| b.run.orbits.len()).sum();
+            let events: usize = family.branches.iter().map(|b| b.run.events.len()).sum();
+            let points: usize = self.plane.curves.iter().map(|c| c.points.len()).sum();
+            eprintln!(
+                "{held:?} orbits {} branches {} steps {steps} events {events} new {} curves {} points {points}: search {ts:.2} follow {tf:.2} curves {:.2} all {:.2}",
+                section.orbits,
+                family.branches.len(),
+                section.new,
+                self.plane.curves.len(),
+                t.elapsed().as_secs_f64(),
+                t0.elapsed().as_secs_f64()
+            );
         }
         Ok(section)
     }
@@ -134,13 +155,12 @@ impl Curves {
     fn add(
         &mut self,
         family: &Family,
-        from: usize,
         (axis, held): (usize, f64),
         request: &Request,
         control: &Control,
     ) -> Result<usize, Error> {
         let before = self.plane.curves.len();
-        for branch in &family.branches[from..] {
+        for branch in &family.branches {
             if !request.wants(branch.of.n, branch.of.w) {
                 continue;
             }

@@ -8,7 +8,7 @@
 //! - [`lyapunov`]: the largest exponent of the attractor that a start reaches; [`ensemble`], [`tangent_growth`]:
 //!   exponents of many trajectories
 //! - [`orbits`]: all periodic orbits of one period and winding; `multistart`: starting points of
-//!   Newton's method
+//!   Newton's method; `every_orbit`: those of all periods and windings
 //! - [`branches`]: all branches of orbits of one type along a parameter; [`curves`]: the bifurcation set of a plane
 //! - [`parameter_map`]: the attractors over a plane of two parameters; [`survey`]: its blocks; [`cell`],
 //!   [`resolution`]: one pendulum of it, and its step length
@@ -31,6 +31,7 @@ pub mod cell;
 pub mod control;
 pub mod curves;
 pub mod ensemble;
+mod every_orbit;
 pub mod finite_time;
 mod kinked_tongues;
 pub mod label;

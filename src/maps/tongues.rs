@@ -186,7 +186,7 @@ impl Asked {
     fn along_p(&self, pendulum: &Pendulum, omega: f64) -> Result<Family, Error> {
         let law = Law::Quadratic([0.0, self.p_max, 0.0]);
         let base = under(pendulum, self.p_max, omega);
-        Family::new(Course { base, axes: vec![vec![(Parameter::P, law)]] }, WHOLE, 0)
+        Family::new(Course::new(base, vec![vec![(Parameter::P, law)]]), WHOLE, 0)
     }
 
     /// Amplitudes and multipliers of the events about a balance; adds them to the seeds.
@@ -271,7 +271,7 @@ impl Asked {
     fn along_torque(&self, at: f64, omega: f64) -> Course {
         let law = Law::Quadratic([0.0, self.torque, 0.0]);
         let base = under(&self.level, at * self.p_max, omega);
-        Course { base, axes: vec![vec![(Parameter::Torque, law)]] }
+        Course::new(base, vec![vec![(Parameter::Torque, law)]])
     }
 
     /// A point of the orbit that rest becomes as the torque grows from 0; none if it ends before.
@@ -309,7 +309,7 @@ impl Asked {
             vec![(Parameter::P, law(0.0, self.p_max))],
             vec![(Parameter::Omega, law(*low, *high))],
         ];
-        let mut plane = Plane::new(Course { base, axes }, BORN)?;
+        let mut plane = Plane::new(Course::new(base, axes), BORN)?;
         let kinked = KinkedRest::of(&under(&self.level, self.p_max, *low), BALANCES[0]).is_some();
         if kinked || (self.torque == 0.0 && plane.symmetry != Some(Symmetry::AtOnce)) {
             return Ok(None);

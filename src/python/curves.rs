@@ -65,7 +65,7 @@ pub fn bifurcation_set(
         parameters.into_iter().map(one).collect()
     };
     let axes = vec![axis(axes.0).map_err(raise)?, axis(axes.1).map_err(raise)?];
-    let course = Course { base, axes };
+    let course = Course::new(base, axes);
     let request = Request { longest, only, threads };
     let found = interruptible(py, progress.as_ref(), |control| search(&course, &request, control))?;
     BifurcationSet::new(py, &found.plane, &found.sections)

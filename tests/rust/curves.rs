@@ -21,7 +21,7 @@ const OMEGA: [f64; 2] = [0.5, 3.0];
 
 fn course(base: Pendulum) -> Course {
     let law = |[low, high]: [f64; 2]| Law::Quadratic([low, high - low, 0.0]);
-    Course { base, axes: vec![vec![(Parameter::P, law(P))], vec![(Parameter::Omega, law(OMEGA))]] }
+    Course::new(base, vec![vec![(Parameter::P, law(P))], vec![(Parameter::Omega, law(OMEGA))]])
 }
 
 /// The values of a point.
