@@ -134,6 +134,9 @@ def planes() -> None:
     render.draw(bifurcation(Pendulum(), {"p": (0.9, 2.0, 2000)}), HERE / "bifurcation.png", dpi=110)
     branches = continuation(Pendulum(omega=1.8), {"p": (0.05, 1.3)}, n=2, longest=4)
     render.draw(branches, HERE / "continuation.png", dpi=110)
+    ranges = {"p": (0.0, 2.5), "omega": (1.5, 3.0)}
+    curves = continuation(Pendulum(), ranges, up_to=2)
+    render.draw(curves, HERE / "bifurcation_set.png", dpi=110)
 
 
 def in_axes() -> None:

@@ -1,7 +1,7 @@
 //! A branch of orbits, followed by pseudo-arclength.
 //!
-//! The unknowns are the points of the orbit and the coordinate of the course, each in its unit. A step predicts along the
-//! tangent and returns to the branch in the plane across it (Keller 1977). It is taken if tangent and multipliers have
+//! The unknowns are the points of the orbit and the coordinate of the course, each in its unit. A step predicts by
+//! tangent and curvature and returns to the branch in the plane across it (Keller 1977). It is taken if tangent and multipliers have
 //! turned little, Newton's method has moved the prediction little, and the determinant of the bordered system has
 //! kept its sign. That determinant vanishes on a branch only where branches cross, and neighbouring branches have
 //! opposite signs: however near one another they lie, a step from one to the next is noticed.

@@ -1,6 +1,6 @@
 //! A curve of orbits with a critical multiplier, followed by pseudo-arclength in the plane of two coordinates.
 //!
-//! As [`super::branch`] follows orbits along one coordinate. The prediction has the curve's curvature too. Points of codimension
+//! As [`super::branch`] follows orbits along one coordinate. Points of codimension
 //! 2 are zeros of the coefficient of the normal form: of the square at a cusp, where the curve itself is smooth and passes
 //! through; of the cube where a doubling or a symmetry breaking changes between super- and subcritical, and a curve
 //! of folds of the new orbits begins (Kuznetsov 2004, Elements of Applied Bifurcation Theory, sections 9.2 and 9.3).

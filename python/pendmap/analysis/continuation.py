@@ -40,7 +40,6 @@ if TYPE_CHECKING:
 LONGEST: Final = 64  # Longest period of an orbit, in forcing periods
 _PLACES: Final = 33  # Values along a range, from which the core knows how parameters depend on it
 _LISTED: Final = 16  # Largest number of events in a summary
-_CRITICALITY: Final = {-1: "no meaning", 0: "subcritical", 1: "supercritical"}
 
 
 def _events(dataset: xr.Dataset) -> list[dict[str, Any]]:
@@ -84,8 +83,8 @@ SCHEMA = Schema(
     Field("w", "turns", "net turns over it"),
     Field("longest", "periods", "longest period of branches begun at doublings"),
     Field("start", "", "angle and velocity where one branch was begun", None, json=False),
-    Field("low", "", "lower end of the range"),
-    Field("high", "", "upper end of the range"),
+    Field("low", "", "lower end of the range, or of both"),
+    Field("high", "", "upper end of the range, or of both"),
     *(field.hidden for field in varied.DRIVE),
     *result.TIMED,
     *result.END,
@@ -117,10 +116,9 @@ def continuation(  # noqa: PLR0913 (physics first, numerical choices by name)
     at which a turn becomes a stick, the velocity touches 0, or friction holds the orbit for ever.
 
     With two parameters: curves of folds, period doublings and symmetry breakings in their plane, of
-    all orbits up to some period and of both rests. Sections of the plane are searched in both
-    directions until several in a row have no event that no curve passes through. Points of
-    codimension 2 are located: cusps, and where a doubling or a symmetry breaking changes between
-    super- and subcritical, with the curves of folds that begin there.
+    all orbits up to some period and of both rests, from sections in both directions until several
+    in a row have no event off the curves. Points of codimension 2 are located: cusps, and where a
+    doubling or a symmetry breaking changes between super- and subcritical.
 
     Parameters
     ----------
@@ -301,7 +299,7 @@ def _dataset(raw: _core.Continuation, axis: Varied, units: Units) -> xr.Dataset:
         "event_w": variable("event", raw.w[owner[place]], "turns", "net turns over it"),
         "event_multipliers": variable(("event", *pair), multipliers[place], "1", multiplier),
         "event_supercritical": flag(
-            "event", raw.supercritical, "whether new orbits live beyond it", _CRITICALITY
+            "event", raw.supercritical, "whether new orbits live beyond it", curves.CRITICALITY
         ),
         "event_smooth": flag("event", raw.smooth, "whether the map is smooth there"),
         "event_branch": variable("event", owner[place], "1", "number of the branch"),

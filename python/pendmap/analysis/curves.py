@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from pendmap.units import Units
 
 LONGEST = 16  # Longest period of orbits whose curves are followed, in forcing periods
-_CRITICALITY = {-1: "no meaning", 0: "subcritical", 1: "supercritical"}
+CRITICALITY = {-1: "no meaning", 0: "subcritical", 1: "supercritical"}
 
 
 def entries(dataset: xr.Dataset) -> list[dict[str, Any]]:
@@ -123,7 +123,7 @@ def variables(raw: _core.BifurcationSet, axes: tuple[Varied, ...], units: Units)
             ("place", "eigenvalue", "part"), multipliers, "1", "Floquet multiplier"
         ),
         "place_supercritical": flag(
-            "place", raw.supercritical, "whether new orbits live beyond it", _CRITICALITY
+            "place", raw.supercritical, "whether new orbits live beyond it", CRITICALITY
         ),
         "degenerate_kind": variable(
             "degenerate", np.array(raw.degenerate_kind, dtype=str), long_name="what it is"

@@ -3,11 +3,10 @@
 Curves by perturbation: a periodic solution of ``th'' + gamma th' + (1 + p cos(omega tau)) th = 0``
 is written with few harmonics, and those that are not resonant are eliminated, their damping left
 out: the methods of Struble, of averaging and of multiple scales agree to this order. First tongue,
-about ``omega = 2``, ``a = 1 - omega^2/4``, ``c = gamma omega/2``: to first order
-``a^2 + c^2 = p^2/4``; the third harmonic, ``C = (p/2) A / (9 omega^2/4 - 1)``, adds ``k p^2``,
-``k = 1/(9 omega^2 - 4)``, to ``a``. Second tongue, about ``omega = 1``, ``a = 1 - omega^2``,
-``c = gamma omega``: the constant ``-(p/2) A`` takes ``p^2/2`` off the stiffness of the cosine, the
-second harmonic adds ``s p^2``, ``s = 1/(4 (4 omega^2 - 1))``, to both:
+about ``omega = 2``, ``a = 1 - omega^2/4``, ``c = gamma omega/2``: the third harmonic adds
+``k p^2``, ``k = 1/(9 omega^2 - 4)``, to ``a`` in ``a^2 + c^2 = p^2/4``. Second tongue, about
+``omega = 1``, ``a = 1 - omega^2``, ``c = gamma omega``: the constant takes ``p^2/2`` off the
+stiffness of the cosine, the second harmonic adds ``s p^2``, ``s = 1/(4 (4 omega^2 - 1))``, to both:
 ``(a - (1/2 - s) p^2)(a + s p^2) + c^2 = 0``.
 """
 
@@ -99,25 +98,19 @@ def tongues(
     """Compute the critical curves of rest, exact, with folds and asymptotic curves.
 
     Hanging rest obeys ``th'' + gamma th' + (1 + p cos(omega tau)) th = 0`` (eq. 1.3 with damping);
-    inverted rest the same with ``-(1 + p cos(omega tau))``. The derivative of the stroboscopic map
-    there is its monodromy matrix ``M``, and rest changes its stability where a multiplier passes
-    +1, ``1 - tr M + det M = 0``, or -1, ``1 + tr M + det M = 0``. These are events on the branch of
-    rest over ``p``, as those of :func:`pendmap.continuation`: symmetry breakings and period
-    doublings. A figure has the plane of eq. 1.2, or as its layer ``e-alpha2`` that of eq. 1.4,
-    ``(e, alpha^2) = (p/omega^2, 1/omega^2)``.
+    inverted rest the same with ``-(1 + p cos(omega tau))``. Its stability changes where a Floquet
+    multiplier passes +1 or -1: events on the branch of rest over ``p``, symmetry breakings and
+    period doublings of :func:`pendmap.continuation`. The curves through them are followed, with
+    the points at which they change between super- and subcritical and the folds that begin there:
+    between fold and curve an oscillation (eq. 1.5) coexists with a stable rest. A figure has the
+    plane of eq. 1.2, its layer ``e-alpha2`` that of eq. 1.4, ``(p/omega^2, 1/omega^2)``.
 
-    The curves through the events are followed in the plane, with the points at which they change
-    between super- and subcritical, and with the folds of the oscillations born toward smaller
-    ``p`` (eq. 1.5): between fold and critical curve these coexist with a stable rest.
-
-    A constant torque turns rest into an orbit of the drive's period, which is followed along ``p``
-    around its folds, critical amplitudes with the multiplier +1.
+    A constant torque turns rest into an orbit of the drive's period, with folds at +1.
 
     Parameters
     ----------
     pendulum : Pendulum or Rig
-        The model; its own ``p``, ``omega`` and phase do not matter. With gamma = 0 the curves are
-        those of Mathieu's equation. Effects are included; rest must be a solution.
+        The model; its own ``p``, ``omega`` and phase do not matter. Rest must be a solution.
     omega : array_like, optional
         Frequencies ``Omega/w0`` in ascending order, by default 200 from 0.5 to 3.
     p_max : float
@@ -156,7 +149,8 @@ def tongues(
     numerics = Numerics(run)
     with core_errors():
         raw = _core.tongues(bare, omega.tolist(), p_max, run.workers, run.progress)
-    by_perturbation = np.array([formula(omega, bare.gamma) for _, formula in CURVES.values()])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        by_perturbation = np.array([formula(omega, bare.gamma) for _, formula in CURVES.values()])
     # An expansion in p.
     by_perturbation[(by_perturbation > min(1.0, p_max)) | (bare.torque != 0)] = np.nan
     variables: dict[str, Any] = {
@@ -223,37 +217,27 @@ def _summary(dataset: xr.Dataset) -> list[str]:
 
 
 def first_tongue(omega: Floats, gamma: float) -> Floats:
-    """Return critical ``p`` of the first tongue to first order; nan nearer to the second tongue."""
-    return np.where(omega > 1.0, 2 * np.hypot(1 - omega**2 / 4, gamma * omega / 2), np.nan)
-
-
-def first_tongue_second_order(omega: Floats, gamma: float) -> Floats:
     """Return critical ``p`` of the first tongue to second order; nan if there is none."""
-    a, c = 1 - omega**2 / 4, gamma * omega / 2
-    with np.errstate(divide="ignore", invalid="ignore"):
-        k = 1 / (9 * omega**2 - 4)
-        # k^2 P^2 + (2 a k - 1/4) P + a^2 + c^2 = 0 in P = p^2: the root that is finite for k = 0.
-        half, last = 1 / 8 - a * k, a**2 + c**2
-        p = np.sqrt(last / (half + np.sqrt(half**2 - k**2 * last)))
+    a, c, k = 1 - omega**2 / 4, gamma * omega / 2, 1 / (9 * omega**2 - 4)
+    # k^2 P^2 + (2 a k - 1/4) P + a^2 + c^2 = 0 in P = p^2: the root that is finite for k = 0.
+    half, last = 1 / 8 - a * k, a**2 + c**2
+    p = np.sqrt(last / (half + np.sqrt(half**2 - k**2 * last)))
     # Left of 2/3 the third harmonic is resonant before the first.
     return np.where((omega > 1.0) & np.isfinite(p), p, np.nan)
 
 
 def second_tongue(omega: Floats, gamma: float) -> Floats:
     """Return critical ``p`` of the second tongue to second order; nan if there is none."""
-    a, c = 1 - omega**2, gamma * omega
-    with np.errstate(divide="ignore", invalid="ignore"):
-        s = 1 / (4 * (4 * omega**2 - 1))
-        # s (1/2 - s) P^2 + a (1/2 - 2 s) P - (a^2 + c^2) = 0.
-        leading, half = s * (0.5 - s), a * (0.25 - s)
-        p = np.sqrt((np.sqrt(half**2 + leading * (a**2 + c**2)) - half) / leading)
+    a, c, s = 1 - omega**2, gamma * omega, 1 / (4 * (4 * omega**2 - 1))
+    # s (1/2 - s) P^2 + a (1/2 - 2 s) P - (a^2 + c^2) = 0.
+    leading, half = s * (0.5 - s), a * (0.25 - s)
+    p = np.sqrt((np.sqrt(half**2 + leading * (a**2 + c**2)) - half) / leading)
     # Left of 1/sqrt(2) the second harmonic is nearly resonant itself.
     return np.where((omega > np.sqrt(0.5)) & np.isfinite(p), p, np.nan)
 
 
 CURVES: dict[str, tuple[int, Callable[[Floats, float], Floats]]] = {
-    "tongue 1, first order": (-1, first_tongue),
-    "tongue 1, second order": (-1, first_tongue_second_order),
+    "tongue 1, second order": (-1, first_tongue),
     "tongue 2, second order": (1, second_tongue),
 }
 """Name of each curve, the multiplier on it, and its formula."""

@@ -133,15 +133,14 @@ def bifurcation_set(
             colour = colours[kind]
         types[name], thin = colour, super_[mine] == 0
         kinds.append(kind)
-        for width, shown in ((1.5, ~thin), (0.6, thin)):
+        path = f"{name}/{kind}/{number}".replace(" ", "_").replace(":", "_")
+        for width, shown, at in ((1.5, ~thin, path), (0.6, thin, f"{path}/subcritical")):
             # A piece belongs to both looks at the point where it changes.
             near = shown | np.roll(shown, 1) & (np.arange(shown.size) > 0)
-            at = np.where(near[:, None], places[mine], np.nan)
-            path = f"{name}/{kind}/{number}".replace(" ", "_").replace(":", "_")
-            of: dict[str, Any] = {"dash": _DASHES[kind], "width": width, "path": path}
+            points = np.where(near[:, None], places[mine], np.nan)
+            of: dict[str, Any] = {"dash": _DASHES[kind], "width": width, "path": at}
             if shown.any():
-                lines.append(Line(*at.T, colour=colour, **of, **look))
-                path += "_"
+                lines.append(Line(*points.T, colour=colour, **of, **look))
     marks: list[Mark] = []
     if colours is None:
         marks += [Line(NONE, NONE, colour=types[name], name=name) for name in sorted(types)]

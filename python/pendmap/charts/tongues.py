@@ -85,7 +85,7 @@ def _panel(dataset: xr.Dataset, plane: str, marks: Sequence[tuple[float, float, 
         for m, kind in ((-1, "period_doubling"), (1, "symmetry_breaking")):
             text, shown = typographic(f"multiplier {m:+}"), to(at[multiplier == m])
             drawn.append(Points(*shown.T, colour=_COLOURS[kind], size=2.0, name=text))
-    for k, look in enumerate(("-.", "--", ":")):
+    for k, look in enumerate(("-.", ":")):
         line = to(np.stack([omega, dataset["asymptotic"].values[k]], axis=-1))
         text = str(dataset["formula"].values[k]) if np.isfinite(line).any() else ""
         drawn.append(Line(*line.T, dash=look, width=1.0, name=text))

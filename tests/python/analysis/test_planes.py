@@ -111,7 +111,8 @@ def test_curves_share_the_progress_and_are_recorded(tmp_path: Path) -> None:
     assert "- period doubling: indigo" in legend
     # The fold of the rotation and that of the oscillation bound their kinds.
     folds = found["curve_kind"].values == "fold"
-    assert {(1, 1), (2, 0)} <= {*zip(found.curve_n.values[folds], found.curve_w.values[folds])}
+    both = (found[name].values[folds].tolist() for name in ("curve_n", "curve_w"))
+    assert {(1, 1), (2, 0)} <= {*zip(*both, strict=True)}
 
 
 def test_friction_holds_rest_in_every_cell() -> None:

@@ -144,7 +144,7 @@ def test_errors_of_asymptotic_curves_have_their_order(name: str) -> None:
         exact = p[m == multiplier][0]
         errors.append(abs(float(formula(np.array([omega]), gamma)[0]) - exact) / exact)
     order = math.log2(errors[0] / errors[1])
-    assert order > {"tongue 1, first order": 0.8}.get(name, 1.7), (order, errors)
+    assert order > 1.7, (order, errors)
 
 
 @pytest.fixture(scope="module")
@@ -196,8 +196,8 @@ def test_json_lists_the_frequencies_that_were_asked_for(coarse: xr.Dataset) -> N
     for key in ("curves", "inverted"):
         assert [row["omega"] for row in content[key]] == np.linspace(1.1, 2.1, 5).tolist()
     _, p, multiplier, _ = rest(coarse)
-    assert sum((row["p"] for row in content["curves"]), []) == p.tolist()
-    assert sum((row["multiplier"] for row in content["curves"]), []) == multiplier.tolist()
+    assert [x for row in content["curves"] for x in row["p"]] == p.tolist()
+    assert [x for row in content["curves"] for x in row["multiplier"]] == multiplier.tolist()
 
 
 def test_undamped_rest_is_unstable_from_no_drive_on_where_omega_is_2() -> None:
@@ -208,14 +208,15 @@ def test_undamped_rest_is_unstable_from_no_drive_on_where_omega_is_2() -> None:
     assert found.attrs["title"] == "\N{GREEK SMALL LETTER GAMMA} = 0"
 
 
-@pytest.mark.parametrize(("low", "high"), [(0.70, 0.76), (1.0, 1.3)])
-def test_orbits_of_both_balances_under_a_torque_are_distinct(low: float, high: float) -> None:
-    omega = np.linspace(low, high, 7)
+@pytest.mark.parametrize(("omega", "strips"), [([0.7], 2), ([1.0, 1.1, 1.2, 1.3], 1)])
+def test_orbits_of_both_balances_under_a_torque_are_distinct(
+    omega: list[float], strips: int
+) -> None:
     found = pendmap.tongues(Pendulum(gamma=0.1, torque=0.2), omega)
-    for place in range(omega.size):
+    for place in range(len(omega)):
         hanging, inverted = (
             p[index == place] for index, p, *_ in (rest(found, inverted=up) for up in (False, True))
         )
         # A strip is found at every frequency at which it exists, however narrow.
-        assert inverted.size == 2, omega[place]
+        assert inverted.size == 2 * strips, omega[place]
         assert np.abs(np.subtract.outer(hanging, inverted)).min() > 1e-3, omega[place]
