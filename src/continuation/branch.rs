@@ -25,6 +25,8 @@ const TURN: f64 = 0.15;
 const TRACE: f64 = 0.3;
 const MOVED: f64 = 0.08;
 const MOST: f64 = 2.5;
+/// Length of a prediction by the last step, in units of it.
+const AHEAD: f64 = 2.5;
 /// Ratios of successive steps.
 const CHANGE: [f64; 2] = [0.25, 2.0];
 /// Steps over a place where branches cross.
@@ -142,7 +144,7 @@ impl Cycles<'_> {
                 (length, refused) = (FIRST, None);
                 continue;
             }
-            match self.step(&here, length, &mut refused) {
+            match self.step(&run.orbits, length, &mut refused) {
                 Step::Long(factor) => length *= factor,
                 Step::Over(end, last) => {
                     if let Some(last) = last {
@@ -220,8 +222,10 @@ impl Cycles<'_> {
     }
 
     /// One step; `refused` keeps why the last one was.
-    fn step(&self, here: &Orbit, length: f64, refused: &mut Option<End>) -> Step {
-        let guess = &here.place + &here.tangent * length;
+    fn step(&self, orbits: &[Orbit], length: f64, refused: &mut Option<End>) -> Step {
+        let here = &orbits[orbits.len() - 1];
+        let before = orbits.len().checked_sub(2).map(|k| &orbits[k]);
+        let guess = predicted(before, here, length);
         let Some(next) = self.near(&guess, &here.tangent) else {
             *refused = None;
             return Step::Long(CHANGE[0]);
@@ -301,6 +305,19 @@ impl Cycles<'_> {
         let angle = self.course.base.angle();
         let first = self.points(&a.place)[0];
         self.all_points(&b.place).iter().any(|point| angle.distance(*point, first) < SAME)
+    }
+}
+
+/// The place at a distance ahead of an orbit, by Hermite's cubic through it and the one before if that is far enough away,
+/// or straight on. Where motions part by far within a period, Newton's method needs a good one.
+pub(super) fn predicted(before: Option<&Orbit>, here: &Orbit, length: f64) -> DVector<f64> {
+    let smooth = before.filter(|before| before.is_like(here));
+    let past = smooth.map(|before| (before, (&here.place - &before.place).norm()));
+    match past {
+        Some((before, past)) if length <= AHEAD * past => {
+            interpolated(before, here, 1.0 + length / past)
+        }
+        _ => &here.place + &here.tangent * length,
     }
 }
 

@@ -1,6 +1,6 @@
 //! A curve of orbits with a critical multiplier, followed by pseudo-arclength in the plane of two coordinates.
 //!
-//! As [`super::branch`] follows orbits along one coordinate. The prediction has the curve's curvature too. Points of codimension
+//! As [`super::branch`] follows orbits along one coordinate. Points of codimension
 //! 2 are zeros of the coefficient of the normal form: of the square at a cusp, where the curve itself is smooth and passes
 //! through; of the cube where a doubling or a symmetry breaking changes between super- and subcritical, and a curve
 //! of folds of the new orbits begins (Kuznetsov 2004, Elements of Applied Bifurcation Theory, sections 9.2 and 9.3).
@@ -9,7 +9,7 @@ use std::sync::atomic::AtomicBool;
 
 use nalgebra::DVector;
 
-use super::branch::{End, SAME, interpolated};
+use super::branch::{End, SAME, interpolated, predicted};
 use super::critical::{Critical, Point};
 use super::cycle::Type;
 use super::event::Kind;
@@ -149,12 +149,8 @@ impl Critical<'_> {
         refused: &mut Option<End>,
     ) -> Result<(Point, f64), f64> {
         let here = &points[points.len() - 1];
-        let mut guess = &here.orbit.place + &here.orbit.tangent * length;
-        if let [.., before, _] = points {
-            let turn = &here.orbit.tangent - &before.orbit.tangent;
-            let past = (&here.orbit.place - &before.orbit.place).norm();
-            guess += turn * (0.5 * length * length / past.max(length));
-        }
+        let before = points.len().checked_sub(2).map(|k| &points[k].orbit);
+        let guess = predicted(before, &here.orbit, length);
         let found = self.near(&guess, &here.orbit.tangent, Some(&here.border));
         let Some(mut next) = found else {
             *refused = None;
