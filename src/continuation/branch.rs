@@ -25,6 +25,8 @@ const TURN: f64 = 0.15;
 const TRACE: f64 = 0.3;
 const MOVED: f64 = 0.08;
 const MOST: f64 = 2.5;
+/// How much longer steps are where what is found is refined later.
+const EASE: f64 = 2.0;
 /// Length of a prediction by the last step, in units of it.
 const AHEAD: f64 = 2.5;
 /// Ratios of successive steps.
@@ -187,7 +189,7 @@ impl Cycles<'_> {
                         return Ok((run, End::Closed));
                     }
                     event::between(self, &here, &next, &mut run);
-                    length = (length * factor).min(LONGEST);
+                    length = (length * factor).min(LONGEST * self.ease());
                 }
             }
         }
@@ -236,7 +238,9 @@ impl Cycles<'_> {
         let moved = next.moved / (MOVED * length);
         // At a change of phases the derivative jumps: the branch is followed up to there first.
         let smooth = next.is_like(here);
-        let worst = if smooth { moved.max(turn / TURN).max(change / TRACE) } else { moved };
+        let ease = self.ease();
+        let turned = (turn / TURN).max(change / TRACE) / ease;
+        let worst = if smooth { moved.max(turned) } else { moved };
         if worst > MOST {
             *refused = None;
             return Step::Long((0.9 / worst).clamp(CHANGE[0], 0.5));
@@ -258,6 +262,11 @@ impl Cycles<'_> {
             return Step::Over(End::Fast, None);
         }
         Step::On(Box::new(next), (1.0 / worst).clamp(0.5, CHANGE[1]))
+    }
+
+    /// Steps are so much longer where all is refined later.
+    fn ease(&self) -> f64 {
+        if self.course.is_rough() { EASE } else { 1.0 }
     }
 
     /// An orbit on the other side of a place where branches cross, straight on.
