@@ -1,7 +1,7 @@
 //! A branch of orbits, followed by pseudo-arclength.
 //!
-//! The unknowns are the points of the orbit and the coordinate of the course, each in its unit. A step predicts by
-//! tangent and curvature and returns to the branch in the plane across it (Keller 1977). It is taken if tangent and multipliers have
+//! The unknowns are the points of the orbit and the coordinate of the course, each in its unit. A step predicts along the
+//! tangent and returns to the branch in the plane across it (Keller 1977). It is taken if tangent and multipliers have
 //! turned little, Newton's method has moved the prediction little, and the determinant of the bordered system has
 //! kept its sign. That determinant vanishes on a branch only where branches cross, and neighbouring branches have
 //! opposite signs: however near one another they lie, a step from one to the next is noticed.
@@ -25,6 +25,10 @@ const TURN: f64 = 0.15;
 const TRACE: f64 = 0.3;
 const MOVED: f64 = 0.08;
 const MOST: f64 = 2.5;
+/// How much longer steps are where what is found is refined later.
+const EASE: f64 = 2.0;
+/// Length of a prediction by the last step, in units of it.
+const AHEAD: f64 = 2.5;
 /// Ratios of successive steps.
 const CHANGE: [f64; 2] = [0.25, 2.0];
 /// Steps over a place where branches cross.
@@ -185,7 +189,7 @@ impl Cycles<'_> {
                         return Ok((run, End::Closed));
                     }
                     event::between(self, &here, &next, &mut run);
-                    length = (length * factor).min(LONGEST);
+                    length = (length * factor).min(LONGEST * self.ease());
                 }
             }
         }
@@ -219,10 +223,10 @@ impl Cycles<'_> {
         None
     }
 
-    /// One step from the last of the orbits; `refused` keeps why the last one was.
+    /// One step; `refused` keeps why the last one was.
     fn step(&self, orbits: &[Orbit], length: f64, refused: &mut Option<End>) -> Step {
         let here = &orbits[orbits.len() - 1];
-        let before = orbits.iter().nth_back(1).filter(|before| before.is_like(here));
+        let before = orbits.len().checked_sub(2).map(|k| &orbits[k]);
         let guess = predicted(before, here, length);
         let Some(next) = self.near(&guess, &here.tangent) else {
             *refused = None;
@@ -234,7 +238,9 @@ impl Cycles<'_> {
         let moved = next.moved / (MOVED * length);
         // At a change of phases the derivative jumps: the branch is followed up to there first.
         let smooth = next.is_like(here);
-        let worst = if smooth { moved.max(turn / TURN).max(change / TRACE) } else { moved };
+        let ease = self.ease();
+        let turned = (turn / TURN).max(change / TRACE) / ease;
+        let worst = if smooth { moved.max(turned) } else { moved };
         if worst > MOST {
             *refused = None;
             return Step::Long((0.9 / worst).clamp(CHANGE[0], 0.5));
@@ -256,6 +262,11 @@ impl Cycles<'_> {
             return Step::Over(End::Fast, None);
         }
         Step::On(Box::new(next), (1.0 / worst).clamp(0.5, CHANGE[1]))
+    }
+
+    /// Steps are so much longer where all is refined later.
+    fn ease(&self) -> f64 {
+        if self.course.is_rough() { EASE } else { 1.0 }
     }
 
     /// An orbit on the other side of a place where branches cross, straight on.
@@ -306,15 +317,17 @@ impl Cycles<'_> {
     }
 }
 
-/// The place at a distance from an orbit along the tangent, with the curvature since the one before.
+/// The place at a distance ahead of an orbit, by Hermite's cubic through it and the one before if that is far enough away,
+/// or straight on. Where motions part by far within a period, Newton's method needs a good one.
 pub(super) fn predicted(before: Option<&Orbit>, here: &Orbit, length: f64) -> DVector<f64> {
-    let mut guess = &here.place + &here.tangent * length;
-    if let Some(before) = before {
-        let turn = &here.tangent - &before.tangent;
-        let past = (&here.place - &before.place).norm();
-        guess += turn * (0.5 * length * length / past.max(length));
+    let smooth = before.filter(|before| before.is_like(here));
+    let past = smooth.map(|before| (before, (&here.place - &before.place).norm()));
+    match past {
+        Some((before, past)) if length <= AHEAD * past => {
+            interpolated(before, here, 1.0 + length / past)
+        }
+        _ => &here.place + &here.tangent * length,
     }
-    guess
 }
 
 /// A part of the way between two orbits, by Hermite's cubic.

@@ -114,6 +114,12 @@ impl Course {
         Self { base: self.base.clone(), axes, step: self.step }
     }
 
+    /// Whether steps are longer than precise ones: what is found is refined later.
+    #[must_use]
+    pub fn is_rough(&self) -> bool {
+        self.step > STEP
+    }
+
     /// The value of a parameter, and its derivative by each coordinate; none if it does not vary.
     fn value(&self, parameter: Parameter, at: &[f64]) -> Option<(f64, [f64; 2])> {
         let mut found = None::<(f64, [f64; 2])>;

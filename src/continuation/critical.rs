@@ -21,7 +21,7 @@ const SETTLED: f64 = 1e-12;
 /// Where steps no longer shrink, a gap below this is one of rounding.
 const STALLED: f64 = 1e-11;
 /// A gap of this many units of rounding is none.
-const ROUNDING: f64 = 16.0 * f64::EPSILON;
+const ROUNDING: f64 = 256.0 * f64::EPSILON;
 /// Displacement along `v` of the difference for a second derivative, near the cube root of rounding.
 const BESIDE: f64 = 6e-6;
 

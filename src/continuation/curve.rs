@@ -36,6 +36,8 @@ const CLOSE: f64 = 0.1;
 /// Refinements of a zero at most, and the part of a step at which it is known.
 const REFINEMENTS: usize = 40;
 const EXACT: f64 = 1e-14;
+/// A determinant that should be 0 is at most this.
+const VAGUE: f64 = 1e-5;
 /// A coefficient that vanishes is at most this part of those beside it.
 const ZERO: f64 = 1e-4;
 
@@ -113,6 +115,10 @@ impl Critical<'_> {
                 (run.end, run.met) = (end, Some(met));
                 break;
             }
+            if self.is_vague(&next) {
+                run.end = End::Lost(next.orbit.norm);
+                break;
+            }
             if next.orbit.place.amax() > FASTEST {
                 run.end = End::Fast;
                 break;
@@ -149,7 +155,7 @@ impl Critical<'_> {
         refused: &mut Option<End>,
     ) -> Result<(Point, f64), f64> {
         let here = &points[points.len() - 1];
-        let before = points.iter().nth_back(1).map(|point| &point.orbit);
+        let before = points.len().checked_sub(2).map(|k| &points[k].orbit);
         let guess = predicted(before, &here.orbit, length);
         let found = self.near(&guess, &here.orbit.tangent, Some(&here.border));
         let Some(mut next) = found else {
@@ -172,6 +178,12 @@ impl Critical<'_> {
         }
         next.coefficient = self.coefficient(&next, false);
         Ok((next, (1.0 / worst).clamp(0.5, CHANGE[1])))
+    }
+
+    /// Whether rounding hides that a multiplier is critical.
+    fn is_vague(&self, point: &Point) -> bool {
+        let test = point.orbit.tests[usize::from(self.multiplier() < 0.0)];
+        test.abs() > VAGUE
     }
 
     /// The coefficient of the normal form, precise or to some digits; not a number where it is not known.

@@ -35,6 +35,8 @@ const CONTRACTION: f64 = 0.3;
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 /// Within this many times as much steps that do not shrink are those of rounding.
 const NOISE: f64 = 100.0;
+/// A gap that is none where steps of the integrator are long.
+const ROUGH: f64 = 1e-10;
 /// A step below this is one of rounding.
 const SETTLED: f64 = 1e-13;
 /// Under friction a velocity below this is 0.
@@ -227,7 +229,12 @@ impl Cycles<'_> {
             let system = self.system(&place, steps)?;
             let size = place.amax().max(1.0);
             let rounding = ROUNDING * (1.0 + system.norm) * size;
+            let rounding = if self.course.is_rough() { rounding.max(ROUGH) } else { rounding };
             let gap = system.gap.amax();
+            if gap <= rounding && self.course.is_rough() {
+                let moved = (&place - guess).norm();
+                return self.complete(place, &system, row, moved);
+            }
             let count = system.gap.len();
             let mut right = system.gap.clone().insert_row(count, 0.0);
             right[count] = row.dot(&(&place - guess));

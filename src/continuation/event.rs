@@ -10,7 +10,6 @@
 
 use super::branch::{Run, interpolated};
 use super::cycle::{Closure, Cycles, Orbit};
-use crate::orbit::poincare::STEP;
 
 /// Refinements of a zero at most, and the part of a step at which it is known.
 const REFINEMENTS: usize = 40;
@@ -214,7 +213,7 @@ fn zero(cycles: &Cycles<'_>, a: &Orbit, b: &Orbit, test: Test) -> Option<Orbit> 
     let mut ends = [(0.0, test(cycles, a)), (1.0, test(cycles, b))];
     let mut best: Option<(f64, Orbit)> = None;
     let mut stayed = None;
-    let exact = if cycles.course.step > STEP { ROUGH } else { EXACT };
+    let exact = if cycles.course.is_rough() { ROUGH } else { EXACT };
     for _ in 0..REFINEMENTS {
         let [(low, at_low), (high, at_high)] = ends;
         if high - low < exact {

@@ -26,6 +26,8 @@ const BATCH: usize = 4;
 const PRECISE: f64 = 0.125;
 /// A product of the null vectors below this is 0.
 const NONE: f64 = 1e-9;
+/// The part of all steps of the integrator that is enough for a sign.
+const COARSE: f64 = 0.6;
 /// Weights of differences at distances 1, 2 and 3 that leave errors of the sixth power.
 const WEIGHTS: [f64; 3] = [1.5, -0.6, 0.1];
 
@@ -46,7 +48,7 @@ impl Critical<'_> {
         for batch in 0..HALVINGS / BATCH {
             let halved = |k: usize| BESIDE * 0.5_f64.powi((batch * BATCH + k) as i32);
             let distances: [f64; BATCH] = std::array::from_fn(halved);
-            let laps = self.displaced(point, &distances);
+            let laps = self.displaced(point, &distances, COARSE);
             for (distance, laps) in distances.iter().zip(&laps) {
                 let laps = std::slice::from_ref(laps);
                 let Some([here, size]) = self.cubic_within(point, &[*distance], laps, &[1.0])
@@ -58,7 +60,7 @@ impl Critical<'_> {
                         return Some(here);
                     }
                     let distances = [1.0, 2.0, 3.0].map(|k| k * PRECISE * distance);
-                    let laps = self.displaced(point, &distances);
+                    let laps = self.displaced(point, &distances, 1.0);
                     return Some(self.cubic_within(point, &distances, &laps, &WEIGHTS)?[0]);
                 }
                 before = Some(here);
@@ -67,12 +69,14 @@ impl Critical<'_> {
         None
     }
 
-    /// The images of points displaced by distances along the null vector and against it.
-    fn displaced(&self, point: &Point, distances: &[f64]) -> Vec<[Vec<Image>; 2]> {
+    /// The images of points displaced by distances along the null vector and against it, by a part of the steps.
+    fn displaced(&self, point: &Point, distances: &[f64], steps: f64) -> Vec<[Vec<Image>; 2]> {
         let place = &point.orbit.place;
         let [_, right] = point.border.vectors();
         let points = self.points(place);
-        let map = Period::<4>::new(self.cycles.course, &Self::at(place));
+        let at = Self::at(place);
+        let count = Period::<4>::count(self.cycles.course, &at) as f64 * steps;
+        let map = Period::<4>::new(self.cycles.course, &at).by(count as usize);
         let both = distances.iter().flat_map(|by| [*by, -by]);
         let laps: Vec<_> = both.map(|by| Self::beside(&points, right, by)).collect();
         let mut images = self.images(&map, &laps).into_iter();

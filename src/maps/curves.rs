@@ -20,12 +20,12 @@ const MOST: usize = 12;
 const QUIET: usize = 2;
 /// Distance of the first sections from the edges.
 const EDGE: f64 = 1e-3;
-/// Places along a section at which orbits are searched.
-const PLACES: [f64; 3] = [0.95, 0.5, 0.2];
-/// Lengths of steps, in units of the fastest small oscillation, of curves and of what they are begun from: they err by 1e-12
-/// and 1e-10 in a few periods.
-const STEP: f64 = 0.04;
-const SEED_STEP: f64 = 0.06;
+/// Places along a section at which orbits are searched: at least, at most, and in a row without a new branch.
+const PLACES: [usize; 3] = [4, 12, 2];
+/// Lengths of steps, in units of the fastest small oscillation, of curves and of what they are begun from: they err by 1e-11
+/// and 1e-9 in a few periods.
+const STEP: f64 = 0.055;
+const SEED_STEP: f64 = 0.085;
 /// The longest period of a request.
 const LONGEST: usize = 16;
 /// The golden section.
@@ -47,6 +47,8 @@ pub struct Request {
 pub struct Section {
     /// The coordinate that is held there, 0 or 1, and its value.
     pub held: (usize, f64),
+    /// Places at which orbits were searched.
+    pub places: usize,
     /// Orbits found.
     pub orbits: usize,
     /// New curves.
@@ -115,10 +117,17 @@ impl Curves {
         let axis = 1 - held.0;
         let course = self.plane.course.along(axis, held.1).by(SEED_STEP);
         let mut family = Family::new(course, Bounds { low: 0.0, high: 1.0 }, request.longest)?;
-        let mut section = Section { held, orbits: 0, new: 0 };
+        let mut section = Section { held, places: 0, orbits: 0, new: 0 };
         let t0 = std::time::Instant::now();
         let (mut ts, mut tf) = (0.0, 0.0);
-        for at in PLACES {
+        let [least, most, quiet] = PLACES;
+        let mut idle = 0;
+        for k in 0..most {
+            if k >= least && idle >= quiet {
+                break;
+            }
+            let at = (0.5 + GOLDEN * k as f64).fract();
+            let known = family.branches.len();
             let pendulum = family.pendulum(at);
             let t = std::time::Instant::now();
             let all = every_orbit(&pendulum, request.longest, request.threads, control)?;
@@ -131,6 +140,8 @@ impl Curves {
                 }
             }
             tf += t.elapsed().as_secs_f64();
+            section.places += 1;
+            idle = if family.branches.len() > known { 0 } else { idle + 1 };
         }
         let t = std::time::Instant::now();
         section.new = self.add(&family, (axis, held.1), request, control)?;
@@ -139,7 +150,8 @@ impl Curves {
             let events: usize = family.branches.iter().map(|b| b.run.events.len()).sum();
             let points: usize = self.plane.curves.iter().map(|c| c.points.len()).sum();
             eprintln!(
-                "{held:?} orbits {} branches {} steps {steps} events {events} new {} curves {} points {points}: search {ts:.2} follow {tf:.2} curves {:.2} all {:.2}",
+                "{held:?} places {} orbits {} branches {} steps {steps} events {events} new {} curves {} points {points}: search {ts:.2} follow {tf:.2} curves {:.2} all {:.2}",
+                section.places,
                 section.orbits,
                 family.branches.len(),
                 section.new,

@@ -10,19 +10,18 @@ use super::advance::advance;
 use super::control::Control;
 use super::multistart::{approach, places};
 use super::orbits::is_held;
-use super::starts::{Axis, Starts};
+use super::starts::Axis;
 use crate::error::Error;
-use crate::integrate::{State, accuracy};
+use crate::integrate::{State, Strobe};
 use crate::lanes::InstructionSet;
 use crate::model::Pendulum;
 use crate::model::pendulum::{Route, Symmetry};
 use crate::orbit::PoincareMap;
 use crate::orbit::newton::{self, PeriodicOrbit};
 
-/// Error after five periods of displacements, and of orbits.
-const TOLERANCES: [f64; 2] = [1e-6, 1e-9];
-/// Starts by which it is measured.
-const SAMPLE: usize = 200;
+/// Lengths of steps for displacements and for orbits, in units of the fastest small oscillation: errors of 1e-6 and 1e-10 in a
+/// few periods.
+const STEPS: [f64; 2] = [0.2, 0.06];
 /// Cells along a turn, a period.
 const CELLS: usize = 60;
 /// Starts of Newton's method at most, a period.
@@ -55,16 +54,11 @@ pub fn every_orbit(
         let theta = Axis::new("theta", -PI, PI, count)?;
         Ok::<_, Error>([theta, Axis::new("velocity", low, reach, count * sides / 2)?])
     };
-    let [theta, velocity] = grid(1)?;
-    let sample = Starts::Grid { theta, velocity }.sampled_states(SAMPLE, 0);
-    let coarse = accuracy::choose(pendulum, &sample, TOLERANCES[0], simd)?.0;
+    let duration = pendulum.period() * pendulum.greatest_pull().sqrt();
+    let [coarse, fine] =
+        STEPS.map(|step| Strobe::new(pendulum, (duration / step).ceil() as usize, simd));
     let plain = pendulum.route() == Route::Smooth && !pendulum.has_extra_load();
-    let map = if plain {
-        let fine = accuracy::choose(pendulum, &sample, TOLERANCES[1], simd);
-        fine.map_or_else(|_| PoincareMap::new(pendulum), |(fine, _)| PoincareMap::of_steps(&fine))
-    } else {
-        PoincareMap::new(pendulum)
-    };
+    let map = if plain { PoincareMap::of_steps(&fine) } else { PoincareMap::new(pendulum) };
     let mut all: Vec<PeriodicOrbit> = Vec::new();
     for n in 1..=longest {
         // The displacement; on the circle without turns.
