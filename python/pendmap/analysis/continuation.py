@@ -180,7 +180,7 @@ def continuation(  # noqa: PLR0913 (physics first, numerical choices by name)
     """
     if isinstance(ranges, Mapping) and len(ranges) == 2 and _are_axes(ranges):  # noqa: PLR2004
         pendulum = varied.having(pendulum, ranges)
-        pairs = {name: (*ends[:2], _PLACES) for name, ends in ranges.items()}
+        pairs = {k: (*x[:2], _PLACES) if isinstance(x, tuple) else x for k, x in ranges.items()}
         axes = varied.varied(pendulum, pairs, 2)
         numerics = Numerics(RunOptions.of(run, options).in_memory("continuation"))
         dataset, request = curves.in_plane(pendulum, axes, up_to, numerics)

@@ -180,7 +180,8 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     over: dict[str, Any] = {}
     if curves and several is None:
         numerics, run = Numerics(run.part(0, 2)), run.part(1, 2)
-        over = dict(in_plane(pendulum, axes, _LONGEST, numerics)[0].variables)
+        plane = in_plane(pendulum, axes, _LONGEST, numerics)[0]
+        over = {str(name): one.variable for name, one in plane.data_vars.items()}
     search = cell_search.CellSearch(pendulum, axes, starts, box, Numerics(run, tol, max_periods))
     if several is not None:
         same = partial(parameter_map, ranges=ranges, starts=starts, box=search.box)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-    from pendmap.charts.marks import Floats
+    from pendmap.charts.marks import Dash, Floats
 
 _COLOURS: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
 _MARKERS: Final = {
@@ -33,7 +33,11 @@ _MARKERS: Final = {
     "generalised_doubling": "o",
     "degenerate_symmetry_breaking": "^",
 }
-_DASHES: Final = {"fold": "-", "period_doubling": DASHED, "symmetry_breaking": DOTTED}
+_DASHES: Final[dict[str, Dash]] = {
+    "fold": "-",
+    "period_doubling": DASHED,
+    "symmetry_breaking": DOTTED,
+}
 _EMPTY: Final[dict[str, Any]] = {"fill": "#ffffff", "edge": INK, "edge_width": 1.0}
 
 
@@ -48,11 +52,9 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
         both = name.split(", ")
         ends = zip(np.ravel(a["low"]).tolist(), np.ravel(a["high"]).tolist(), strict=True)
         of = (str(dataset[f"place_{one}"].attrs.get("units", "1")) for one in both)
-        sides = [
-            Axis(names.symbol(one, unit), pair)
-            for one, unit, pair in zip(both, of, ends, strict=True)
-        ]
-        panel = Panel("curves", "", *sides, bifurcation_set(dataset, both))
+        triples = zip(both, of, ends, strict=True)
+        across, up = (Axis(names.symbol(one, unit), pair) for one, unit, pair in triples)
+        panel = Panel("curves", "", across, up, bifurcation_set(dataset, both))
         title = f"Bifurcations of orbits up to {a['up_to']} periods over {names.over(both)}"
         return Chart(title, names.parameters(a, both), [[panel]], size=(7.4, 5.6)).only(layer)
     units = Units.of(a)
@@ -140,7 +142,8 @@ def bifurcation_set(
             points = np.where(near[:, None], places[mine], np.nan)
             of: dict[str, Any] = {"dash": _DASHES[kind], "width": width, "path": at}
             if shown.any():
-                lines.append(Line(*points.T, colour=colour, **of, **look))
+                x, y = points.T
+                lines.append(Line(x, y, colour=colour, **of, **look))
     marks: list[Mark] = []
     if colours is None:
         marks += [Line(NONE, NONE, colour=types[name], name=name) for name in sorted(types)]

@@ -90,15 +90,16 @@ def _panel(dataset: xr.Dataset, plane: str, marks: Sequence[tuple[float, float, 
         text = str(dataset["formula"].values[k]) if np.isfinite(line).any() else ""
         drawn.append(Line(*line.T, dash=look, width=1.0, name=text))
     if not marks:
-        at, up = map(float, to(np.array([float(attrs["own_omega"]), float(attrs["own_p"])])))
-        drawn.append(this_pendulum(at, up, named=x[0] <= at <= x[1] and 0 <= up <= top))
-    for p, at, name in marks:
-        spot = to(np.array([at, p]))
+        own = to(np.array([float(attrs["own_omega"]), float(attrs["own_p"])]))
+        across, high = map(float, own)
+        drawn.append(this_pendulum(across, high, named=x[0] <= across <= x[1] and high <= top))
+    for p, frequency, name in marks:
+        spot = to(np.array([frequency, p]))
         drawn.append(Points(*spot[:, None], size=5.0))
         aside, up = spot[0] + 0.015 * (x[1] - x[0]), spot[1] + 0.012 * top
         drawn.append(Text(aside, up, name, align=("left", "bottom")))
-    root, across, along = _PLANES[plane]
-    return Panel(plane, "", Axis(across, x), Axis(along, (0.0, top)), drawn, root=root)
+    root, *sides = _PLANES[plane]
+    return Panel(plane, "", Axis(sides[0], x), Axis(sides[1], (0.0, top)), drawn, root=root)
 
 
 def _stable(dataset: xr.Dataset, inverted: bool) -> list[Floats]:  # noqa: FBT001 (which rest)
