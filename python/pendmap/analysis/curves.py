@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from pendmap.analysis.run import Numerics
     from pendmap.analysis.varied import Varied
     from pendmap.model import Pendulum, Rig
-    from pendmap.signal import Floats
     from pendmap.units import Units
 
 LONGEST = 16  # Longest period of orbits whose curves are followed, in forcing periods
@@ -72,10 +71,9 @@ def in_plane(
     bare, units = without_dimensions(pendulum)
     longest = check_whole("up_to", longest, 1, LONGEST)
     if any(axis.values.size == 1 for axis in axes):
-        raise InputError(
-            f"curves must be over two ranges, got one value of {axes[0].name} or {axes[1].name}"
-        )
-    first, second = ((_places(axis.values).tolist(), axis.kernel) for axis in axes)
+        raise InputError("curves must be over two ranges, got one value")
+    parts = [(axis.values - axis.values[0]) / np.ptp(axis.values) for axis in axes]
+    first, second = ((x.tolist(), axis.kernel) for x, axis in zip(parts, axes, strict=True))
     with core_errors():
         run = numerics.run
         raw = _core.bifurcation_set(bare, (first, second), longest, only, run.workers, run.progress)
@@ -84,12 +82,6 @@ def in_plane(
     named = ", ".join(axis.name for axis in axes)
     asked = {"varied": named, "up_to": longest, "low": low, "high": high}
     return dataset, asked
-
-
-def _places(values: Floats) -> Floats:
-    """Return values as parts of their range, from 0 to 1."""
-    parts: Floats = (values - values[0]) / (values[-1] - values[0])
-    return parts
 
 
 def variables(raw: _core.BifurcationSet, axes: tuple[Varied, ...], units: Units) -> dict[str, Any]:

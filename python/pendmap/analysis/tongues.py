@@ -45,16 +45,13 @@ _STABLE = {0: "unstable", 1: "stable"}  # Meanings of a flag
 def _curves(dataset: xr.Dataset, *, inverted: bool) -> list[dict[str, Any]]:
     """Return the critical amplitudes of a rest at each frequency for the JSON object."""
     mine = dataset["critical_inverted"].values == inverted
-    index, p, multiplier, above = (
-        dataset[f"critical_{name}"].values[mine]
-        for name in ("index", "p", "multiplier", "stable_above")
-    )
+    names = ("index", "p", "multiplier", "stable_above")
+    index, *columns = (dataset[f"critical_{name}"].values[mine] for name in names)
+    columns[-1] = columns[-1].astype(bool)
     return [
         {
             "omega": omega,
-            "p": p[index == k].tolist(),
-            "multiplier": multiplier[index == k].tolist(),
-            "stable_above": above[index == k].astype(bool).tolist(),
+            **{n: x[index == k].tolist() for n, x in zip(names[1:], columns, strict=True)},
         }
         for k, omega in enumerate(dataset["omega"].values.tolist())
     ]

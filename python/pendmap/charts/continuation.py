@@ -6,6 +6,7 @@ import itertools
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from scipy.interpolate import PchipInterpolator
 
 from pendmap._core import Attractor
 from pendmap.analysis.result import rows
@@ -38,6 +39,7 @@ _DASHES: Final[dict[str, Dash]] = {
     "period_doubling": DASHED,
     "symmetry_breaking": DOTTED,
 }
+_FINER: Final = 8  # Points of a line for each that was computed
 _EMPTY: Final[dict[str, Any]] = {"fill": "#ffffff", "edge": INK, "edge_width": 1.0}
 
 
@@ -120,41 +122,53 @@ def bifurcation_set(
     """
     if "curve_kind" not in dataset:
         return []
-    owner, super_ = (dataset[f"place_{name}"].values for name in ("curve", "supercritical"))
+    owner, sides = (dataset[f"place_{name}"].values for name in ("curve", "supercritical"))
     places, degenerate = (
         to(np.stack([dataset[f"{which}_{name}"].values for name in over], axis=-1))
         for which in ("place", "degenerate")
     )
+    changes = np.isin(np.arange(owner.size), dataset["degenerate_place"].values)
     types: dict[str, str] = {}
-    kinds: list[str] = []
     lines: list[Mark] = []
-    for number, (kind, n, w) in enumerate(rows(dataset, "curve_kind", "curve_n", "curve_w")):
-        mine = owner == number
+    every = list(rows(dataset, "curve_kind", "curve_n", "curve_w"))
+    for number, (kind, n, w) in enumerate(every):
+        mine = np.flatnonzero(owner == number)
+        if mine.size == 1:  # a corner of the plane
+            continue
         name, colour = _type_of(dataset, mine, n, w)
-        if colours is not None:
-            colour = colours[kind]
-        types[name], thin = colour, super_[mine] == 0
-        kinds.append(kind)
+        types[name] = colour
+        of: dict[str, Any] = {"colour": (colours or {}).get(kind, colour), "dash": _DASHES[kind]}
+        points, first = _smooth(places[mine])
+        # Where new orbits change their side the coefficient has no sign.
+        thin = (sides[mine] == 0)[first + changes[mine][first]]
         path = f"{name}/{kind}/{number}".replace(" ", "_").replace(":", "_")
         for width, shown, at in ((1.5, ~thin, path), (0.6, thin, f"{path}/subcritical")):
             # A piece belongs to both looks at the point where it changes.
             near = shown | np.roll(shown, 1) & (np.arange(shown.size) > 0)
-            points = np.where(near[:, None], places[mine], np.nan)
-            of: dict[str, Any] = {"dash": _DASHES[kind], "width": width, "path": at}
+            x, y = np.where(near[:, None], points, np.nan).T
             if shown.any():
-                x, y = points.T
-                lines.append(Line(x, y, colour=colour, **of, **look))
+                lines.append(Line(x, y, width=width, path=at, **of, **look))
     marks: list[Mark] = []
     if colours is None:
         marks += [Line(NONE, NONE, colour=types[name], name=name) for name in sorted(types)]
-    for kind in [one for one in _DASHES if one in kinds]:
+    for kind in [one for one in _DASHES if any(one == row[0] for row in every)]:
         shade, text = (colours or {}).get(kind, INK), kind.replace("_", " ")
         marks.append(Line(NONE, NONE, colour=shade, dash=_DASHES[kind], name=text))
-    if (super_ == 0).any():
+    if (sides == 0).any():
         marks.append(Line(NONE, NONE, colour=INK, width=0.6, name="thin: subcritical"))
-    every = dataset["degenerate_kind"].values
-    at_kind = ((one, degenerate[every == one]) for one in dict.fromkeys(every.tolist()))
+    special = dataset["degenerate_kind"].values
+    at_kind = ((one, degenerate[special == one]) for one in dict.fromkeys(special.tolist()))
     return [*marks, *lines, *(_events(kind, *at.T) for kind, at in at_kind)]
+
+
+def _smooth(points: Floats) -> tuple[Floats, Any]:
+    """Return a curve through points, with the number of the point before each of its own."""
+    pieces = np.linalg.norm(np.diff(points, axis=0) / np.ptp(points, axis=0).clip(1e-12), axis=1)
+    along = np.concatenate([[0.0], pieces.clip(1e-12).cumsum()])
+    part = np.linspace(0.0, along.size - 1, _FINER * (along.size - 1) + 1)
+    at = np.interp(part, np.arange(along.size), along)
+    first = np.minimum(part.astype(int), along.size - 2)
+    return PchipInterpolator(along, points)(at), first
 
 
 def _type_of(dataset: xr.Dataset, mine: Any, n: int, w: int) -> tuple[str, str]:  # noqa: ANN401 (an array)

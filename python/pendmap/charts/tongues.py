@@ -74,7 +74,6 @@ def _panel(dataset: xr.Dataset, plane: str, marks: Sequence[tuple[float, float, 
     hanging, inverted = ([to(one) for one in _stable(dataset, up)] for up in (False, True))
     drawn: list[Mark] = [Areas(hanging, colour=_STABLE, name=f"hanging {rest}")]
     if inverted:
-        # A hatch leaves the area below it visible, and has no seams.
         name = f"inverted {rest}"
         drawn.append(Areas(inverted, colour=_INVERTED, hatch="////", name=name))
     if "curve_kind" in dataset:
