@@ -78,7 +78,6 @@ lifetime: lifetime --p 1.7 --starts 400 --json
 lifetime_friction: lifetime --p 1.9 --theta-r 0.01 --starts 300 --max-periods 400 --json
 lifetime_draws: lifetime --model drawn.toml --p 1.8 --starts 100 --draws 4 --json
 tongues: tongues --json
-tongues_plane: tongues --plane e-alpha2 --json
 tongues_window: tongues --gamma 0.05 --omega 0.5:3:40 --json
 melnikov: melnikov --p 1.7 --json
 melnikov_effects: melnikov --model si.toml --json

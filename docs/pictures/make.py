@@ -137,6 +137,9 @@ def planes() -> None:
     weak = Pendulum(gamma=0.05, p=0.3, theta_r=0.02)
     resonance = continuation(weak, {"omega": (1.2, 2.4)}, n=2, longest=2)
     render.draw(resonance, HERE / "resonance.png", dpi=110, layer="resonance")
+    ranges = {"p": (0.0, 2.5), "omega": (1.5, 3.0)}
+    curves = continuation(Pendulum(), ranges, up_to=2)
+    render.draw(curves, HERE / "bifurcation_set.png", dpi=110)
 
 
 def in_axes() -> None:

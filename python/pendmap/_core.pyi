@@ -11,8 +11,8 @@ __all__ = [
     "Attractor",
     "BasinPlan",
     "Bifurcation",
+    "BifurcationSet",
     "Continuation",
-    "CriticalAmplitudes",
     "Diverged",
     "Ensemble",
     "Fit",
@@ -28,12 +28,14 @@ __all__ = [
     "Survey",
     "Texture",
     "TextureSum",
+    "Tongues",
     "Trajectory",
     "Uncertainty",
     "WindowRows",
     "__version__",
     "acceleration",
     "advance",
+    "bifurcation_set",
     "bounds",
     "choose_steps",
     "continuation",
@@ -144,6 +146,24 @@ class Continuation:
     supercritical: _Places
     smooth: list[bool]
     sections: list[tuple[float, int]]
+
+@final
+class BifurcationSet:
+    kind: list[str]
+    n: _Places
+    w: _Places
+    symmetric: list[bool]
+    ends: list[tuple[str, str]]
+    meets: list[tuple[int, int]]
+    curve: _Places
+    at: _Floats
+    theta: _Floats
+    velocity: _Floats
+    multipliers: _Floats
+    supercritical: _Places
+    degenerate_kind: list[str]
+    degenerate_place: _Places
+    sections: list[tuple[int, float, int, int]]
 
 @final
 class Texture:
@@ -326,15 +346,15 @@ class Ensemble:
     sum: _Pair
 
 @final
-class CriticalAmplitudes:
-    rest: bool
-    p: list[float]
-    multiplier: list[float]
-    stable: list[bool]
-    moved: bool
-    fold: tuple[float, float, float] | None
-    @staticmethod
-    def no_rest() -> CriticalAmplitudes: ...
+class Tongues:
+    index: NDArray[np.int32]
+    inverted: list[bool]
+    p: _Floats
+    multiplier: _Floats
+    above: list[bool]
+    first: list[tuple[bool, bool]]
+    upright: bool
+    curves: BifurcationSet | None
 
 class FitPoint:
     values: _Floats
@@ -425,6 +445,14 @@ def continuation(
     threads: int,
     progress: _Progress | None = None,
 ) -> Continuation: ...
+def bifurcation_set(
+    model: Pendulum,
+    axes: tuple[tuple[Sequence[float], _Range], tuple[Sequence[float], _Range]],
+    longest: int,
+    only: Sequence[tuple[int, int]] | None,
+    threads: int,
+    progress: _Progress | None = None,
+) -> BifurcationSet: ...
 def orbits_near(
     model: Pendulum, steps: int, states: Sequence[tuple[float, float, int, bool | None]]
 ) -> list[tuple[int, list[_Pair]] | None]: ...
@@ -447,13 +475,11 @@ def growth(
 ) -> _Floats: ...
 def tongues(
     model: Pendulum,
-    inverted: bool,
     omegas: Sequence[float],
     p_max: float,
-    folds: bool,
     threads: int,
     progress: _Progress | None = None,
-) -> list[CriticalAmplitudes]: ...
+) -> Tongues: ...
 def fit_runs(
     runs: Sequence[dict[str, Any]],
     free: Sequence[_Free],

@@ -24,6 +24,10 @@ const TURN: f64 = 0.15;
 const TRACE: f64 = 0.3;
 const MOVED: f64 = 0.08;
 const MOST: f64 = 2.5;
+/// How much longer steps are where what is found is refined later.
+const EASE: f64 = 2.0;
+/// Length of a prediction by the last step, in units of it.
+const AHEAD: f64 = 2.5;
 /// Ratios of successive steps.
 const CHANGE: [f64; 2] = [0.25, 2.0];
 /// Steps over a place where branches cross.
@@ -52,6 +56,10 @@ pub enum End {
     Fast,
     /// Branches cross there.
     Crossing,
+    /// The sequence of slips and sticks changes.
+    Phases,
+    /// At the edge of the plane where nothing drives it.
+    Undriven,
     /// Newton's method fails at any step; with the norm of the derivative of a period.
     Lost(f64),
 }
@@ -68,6 +76,8 @@ impl End {
             Self::Sticks => "sticks for ever",
             Self::Fast => "velocity out of bounds",
             Self::Crossing => "branches cross",
+            Self::Phases => "slips and sticks change",
+            Self::Undriven => "p = 0",
             Self::Lost(_) => "precision lost",
         }
     }
@@ -133,7 +143,7 @@ impl Cycles<'_> {
                 (length, refused) = (FIRST, None);
                 continue;
             }
-            match self.step(&here, length, &mut refused) {
+            match self.step(&run.orbits, length, &mut refused) {
                 Step::Long(factor) => length *= factor,
                 Step::Over(end, last) => {
                     if let Some(last) = last {
@@ -176,7 +186,7 @@ impl Cycles<'_> {
                         return Ok((run, End::Closed));
                     }
                     event::between(self, &here, &next, &mut run);
-                    length = (length * factor).min(LONGEST);
+                    length = (length * factor).min(LONGEST * self.ease());
                 }
             }
         }
@@ -211,8 +221,10 @@ impl Cycles<'_> {
     }
 
     /// One step; `refused` keeps why the last one was.
-    fn step(&self, here: &Orbit, length: f64, refused: &mut Option<End>) -> Step {
-        let guess = &here.place + &here.tangent * length;
+    fn step(&self, orbits: &[Orbit], length: f64, refused: &mut Option<End>) -> Step {
+        let here = &orbits[orbits.len() - 1];
+        let before = orbits.len().checked_sub(2).map(|k| &orbits[k]);
+        let guess = predicted(before, here, length);
         let Some(next) = self.near(&guess, &here.tangent) else {
             *refused = None;
             return Step::Long(CHANGE[0]);
@@ -223,7 +235,9 @@ impl Cycles<'_> {
         let moved = next.moved / (MOVED * length);
         // At a change of phases the derivative jumps: the branch is followed up to there first.
         let smooth = next.is_like(here);
-        let worst = if smooth { moved.max(turn / TURN).max(change / TRACE) } else { moved };
+        let ease = self.ease();
+        let turned = (turn / TURN).max(change / TRACE) / ease;
+        let worst = if smooth { moved.max(turned) } else { moved };
         if worst > MOST {
             *refused = None;
             return Step::Long((0.9 / worst).clamp(CHANGE[0], 0.5));
@@ -243,6 +257,11 @@ impl Cycles<'_> {
             return Step::Over(End::Fast, None);
         }
         Step::On(Box::new(next), (1.0 / worst).clamp(0.5, CHANGE[1]))
+    }
+
+    /// Steps are so much longer where all is refined later.
+    fn ease(&self) -> f64 {
+        if self.course.is_rough() { EASE } else { 1.0 }
     }
 
     /// An orbit on the other side of a place where branches cross, straight on.
@@ -290,6 +309,19 @@ impl Cycles<'_> {
         let angle = self.course.base.angle();
         let first = self.points(&a.place)[0];
         self.all_points(&b.place).iter().any(|point| angle.distance(*point, first) < SAME)
+    }
+}
+
+/// The place at a distance ahead of an orbit, by Hermite's cubic through it and the one before if that is far enough away,
+/// or straight on. Where motions part by far within a period, Newton's method needs a good one.
+pub(super) fn predicted(before: Option<&Orbit>, here: &Orbit, length: f64) -> DVector<f64> {
+    let smooth = before.filter(|before| before.is_like(here));
+    let past = smooth.map(|before| (before, (&here.place - &before.place).norm()));
+    match past {
+        Some((before, past)) if length <= AHEAD * past => {
+            interpolated(before, here, 1.0 + length / past)
+        }
+        _ => &here.place + &here.tangent * length,
     }
 }
 

@@ -23,3 +23,12 @@ pub struct Type {
     /// The angle about which symmetric ones lie: a multiple of pi.
     pub centre: f64,
 }
+
+impl Type {
+    /// Whether period, turns and closure are the same, and of rest its side.
+    #[must_use]
+    pub fn is_like(&self, other: &Self) -> bool {
+        let side = self.closure != Closure::Rest || (self.centre - other.centre).cos() > 0.0;
+        side && (self.n, self.w, self.closure) == (other.n, other.w, other.closure)
+    }
+}

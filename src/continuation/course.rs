@@ -4,6 +4,7 @@ use crate::error::Error;
 use crate::integrate::tangent::Tangent;
 use crate::model::spline::Spline;
 use crate::model::{Equation, Parameter, Pendulum};
+use crate::orbit::poincare::STEP;
 
 /// A smooth function of the coordinate of a course.
 #[derive(Clone, Debug)]
@@ -79,13 +80,44 @@ pub struct Course {
     pub base: Pendulum,
     /// For each coordinate the parameters and their functions of it; one of both is the product.
     pub axes: Vec<Vec<(Parameter, Law)>>,
+    /// Length of equal steps, in units of the fastest small oscillation.
+    pub step: f64,
 }
 
 impl Course {
     /// The course of one parameter.
     #[must_use]
     pub fn of(base: &Pendulum, parameter: Parameter) -> Self {
-        Self { base: base.clone(), axes: vec![vec![(parameter, Law::IDENTITY)]] }
+        Self::new(base.clone(), vec![vec![(parameter, Law::IDENTITY)]])
+    }
+
+    /// A course at the precision of orbits.
+    #[must_use]
+    pub fn new(base: Pendulum, axes: Vec<Vec<(Parameter, Law)>>) -> Self {
+        Self { base, axes, step: STEP }
+    }
+
+    /// This course by steps of another length.
+    #[must_use]
+    pub fn by(mut self, step: f64) -> Self {
+        self.step = step;
+        self
+    }
+
+    /// The course of one of two coordinates, the other one being held.
+    #[must_use]
+    pub fn along(&self, axis: usize, held: f64) -> Self {
+        let mut axes = vec![self.axes[axis].clone()];
+        for (parameter, law) in &self.axes[1 - axis] {
+            axes[0].push((*parameter, Law::Quadratic([law.at(held)[0], 0.0, 0.0])));
+        }
+        Self { base: self.base.clone(), axes, step: self.step }
+    }
+
+    /// Whether steps are longer than precise ones: what is found is refined later.
+    #[must_use]
+    pub fn is_rough(&self) -> bool {
+        self.step > STEP
     }
 
     /// The value of a parameter, and its derivative by each coordinate; none if it does not vary.

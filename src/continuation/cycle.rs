@@ -35,6 +35,8 @@ const CONTRACTION: f64 = 0.3;
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 /// Within this many times as much steps that do not shrink are those of rounding.
 const NOISE: f64 = 100.0;
+/// A gap that is none where steps of the integrator are long.
+const ROUGH: f64 = 1e-10;
 /// A step below this is one of rounding.
 const SETTLED: f64 = 1e-13;
 /// Under friction a velocity below this is 0.
@@ -93,12 +95,13 @@ impl Orbit {
 }
 
 /// The system at one place.
-struct System {
-    gap: DVector<f64>,
+pub(super) struct System {
+    pub(super) gap: DVector<f64>,
     /// Its derivatives by the place.
-    matrix: DMatrix<f64>,
-    images: Vec<Image>,
-    norm: f64,
+    pub(super) matrix: DMatrix<f64>,
+    pub(super) images: Vec<Image>,
+    /// Largest norm of a derivative.
+    pub(super) norm: f64,
 }
 
 impl Cycles<'_> {
@@ -118,7 +121,7 @@ impl Cycles<'_> {
         self.parts().iter().sum()
     }
 
-    fn root(&self) -> f64 {
+    pub(super) fn root(&self) -> f64 {
         (self.count() as f64).sqrt()
     }
 
@@ -149,6 +152,13 @@ impl Cycles<'_> {
         (at - self.origin) / self.scale
     }
 
+    /// All coordinates of a place.
+    #[must_use]
+    pub fn coordinates(&self, place: &DVector<f64>) -> Vec<f64> {
+        let first = place.len() - self.course.axes.len();
+        place.iter().skip(first).map(|x| self.origin + x * self.scale).collect()
+    }
+
     /// The unit vector along the coordinate.
     #[must_use]
     pub fn along(&self) -> DVector<f64> {
@@ -158,16 +168,16 @@ impl Cycles<'_> {
     }
 
     /// The sign of the closing map, and its shift.
-    fn closing(&self) -> (f64, f64) {
+    pub(super) fn closing(&self) -> (f64, f64) {
         match self.of.closure {
             Closure::Whole | Closure::Rest => (1.0, -TAU * self.of.w as f64),
             Closure::Half => (-1.0, 2.0 * self.of.centre),
         }
     }
 
-    fn system(&self, place: &DVector<f64>) -> Option<System> {
+    fn system(&self, place: &DVector<f64>, count: usize) -> Option<System> {
         let at = self.at(place);
-        let map = Period::<3>::new(self.course, &[at]);
+        let map = Period::<3>::new(self.course, &[at]).by(count);
         let mut points = self.points(place);
         if map.rubs() {
             for point in points.iter_mut().filter(|point| point[1].abs() < STILL) {
@@ -208,17 +218,23 @@ impl Cycles<'_> {
     /// of `row`.
     #[must_use]
     pub fn near(&self, guess: &DVector<f64>, row: &DVector<f64>) -> Option<Orbit> {
+        let steps = self.steps(guess);
         if self.of.closure == Closure::Rest {
-            let system = self.system(guess)?;
+            let system = self.system(guess, steps)?;
             return self.complete(guess.clone(), &system, row, 0.0);
         }
         let mut place = guess.clone();
         let mut before = f64::INFINITY;
         for _ in 0..ITERATIONS {
-            let system = self.system(&place)?;
+            let system = self.system(&place, steps)?;
             let size = place.amax().max(1.0);
             let rounding = ROUNDING * (1.0 + system.norm) * size;
+            let rounding = if self.course.is_rough() { rounding.max(ROUGH) } else { rounding };
             let gap = system.gap.amax();
+            if gap <= rounding && self.course.is_rough() {
+                let moved = (&place - guess).norm();
+                return self.complete(place, &system, row, moved);
+            }
             let count = system.gap.len();
             let mut right = system.gap.clone().insert_row(count, 0.0);
             right[count] = row.dot(&(&place - guess));
@@ -241,14 +257,19 @@ impl Cycles<'_> {
 
     /// What the system is at a place where it does not close, with the direction of its kernel.
     pub(super) fn open(&self, place: &DVector<f64>, row: &DVector<f64>) -> Option<Orbit> {
-        self.complete(place.clone(), &self.system(place)?, row, 0.0)
+        self.complete(place.clone(), &self.system(place, self.steps(place))?, row, 0.0)
     }
 
     /// The orbit at a place where it closes, without its direction along a branch.
     #[must_use]
     pub fn unfollowed(&self, place: &DVector<f64>) -> Option<Orbit> {
-        let system = self.system(place)?;
+        let system = self.system(place, self.steps(place))?;
         Some(self.finished(place.clone(), &system, self.along(), true, 0.0))
+    }
+
+    /// Equal steps of a period there.
+    fn steps(&self, place: &DVector<f64>) -> usize {
+        Period::<3>::count(self.course, &[self.at(place)])
     }
 
     fn complete(
@@ -271,7 +292,7 @@ impl Cycles<'_> {
         Some(self.finished(place, system, tangent, orientation, moved))
     }
 
-    fn finished(
+    pub(super) fn finished(
         &self,
         place: DVector<f64>,
         system: &System,
@@ -368,8 +389,7 @@ impl Cycles<'_> {
             return points;
         }
         // The second half passes the section half a period after the mirrored points of the first.
-        let at = self.at(place);
-        let map = Period::<3>::new(self.course, &[at]);
+        let map = Period::<3>::new(self.course, &self.coordinates(place));
         let first = map.images(&points[..whole], 0.5);
         points.extend(first.into_iter().map(|between| image(between.state)));
         points
@@ -377,7 +397,7 @@ impl Cycles<'_> {
 }
 
 /// The factors of a system with one more row.
-fn bordered(matrix: &DMatrix<f64>, row: &DVector<f64>) -> LU<f64, Dyn, Dyn> {
+pub(super) fn bordered(matrix: &DMatrix<f64>, row: &DVector<f64>) -> LU<f64, Dyn, Dyn> {
     let count = matrix.nrows();
     let mut whole = matrix.clone().insert_row(count, 0.0);
     whole.row_mut(count).copy_from(&row.transpose());

@@ -3,6 +3,10 @@
 //! The test functions are the part of the tangent along the coordinate (fold), `det(M + 1)` and, at rest,
 //! `det(M - 1)`, and the product of a complex pair less 1. They pass 0 simply, and are evaluated on orbits of the branch
 //! from exact first derivatives, so that the secant method finds their zeros to rounding.
+//!
+//! About rest without damping both boundaries of a narrow tongue are nearly a double zero of `det(M -+ 1)`. The drive is
+//! even in time then, so that `m11 = m22`, and on a boundary `m12 m21 = m11^2 - 1 = 0`: one is a simple zero of `m12`, the
+//! other of `m21`, however narrow the tongue (Magnus & Winkler 1966, Hill's equation, section 1.1).
 
 use super::branch::{Run, interpolated};
 use super::cycle::{Closure, Cycles, Orbit};
@@ -10,6 +14,10 @@ use super::cycle::{Closure, Cycles, Orbit};
 /// Refinements of a zero at most, and the part of a step at which it is known.
 const REFINEMENTS: usize = 40;
 const EXACT: f64 = 1e-14;
+/// The same where steps are too long for that.
+const ROUGH: f64 = 1e-9;
+/// Relative difference of equal entries.
+const EVEN: f64 = 1e-9;
 
 /// The kind of an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,9 +89,29 @@ fn circle(_: &Cycles<'_>, orbit: &Orbit) -> f64 {
     1.0 - orbit.product.0
 }
 
-/// The test functions of orbits that close in this way.
-fn tests(closure: Closure) -> &'static [(Kind, Test)] {
-    match closure {
+fn upper(_: &Cycles<'_>, orbit: &Orbit) -> f64 {
+    orbit.parts[0][(0, 1)]
+}
+
+fn lower(_: &Cycles<'_>, orbit: &Orbit) -> f64 {
+    orbit.parts[0][(1, 0)]
+}
+
+/// Whether the derivative at rest has equal entries on its diagonal and the determinant 1.
+fn is_even(cycles: &Cycles<'_>, orbit: &Orbit) -> bool {
+    let part = orbit.parts[0];
+    let apart = (part[(0, 0)] - part[(1, 1)]).abs();
+    cycles.of.closure == Closure::Rest
+        && orbit.product == (1.0, true)
+        && apart < EVEN * (1.0 + part[(0, 0)].abs())
+}
+
+/// The test functions of orbits that close like this one.
+fn tests(cycles: &Cycles<'_>, orbit: &Orbit) -> &'static [(Kind, Test)] {
+    if is_even(cycles, orbit) {
+        return &[(Kind::SymmetryBreaking, upper), (Kind::SymmetryBreaking, lower)];
+    }
+    match cycles.of.closure {
         Closure::Whole => {
             &[(Kind::Fold, fold), (Kind::PeriodDoubling, minus), (Kind::NeimarkSacker, circle)]
         }
@@ -128,7 +156,7 @@ fn touched(cycles: &Cycles<'_>, run: &Run, next: &Orbit) -> Option<(bool, Orbit)
         return None;
     }
     let [back, on] = [(here, before), (next, here)].map(|(a, b)| (&a.place - &b.place).norm());
-    tests(cycles.of.closure).iter().find_map(|(_, test)| {
+    tests(cycles, here).iter().find_map(|(_, test)| {
         let sign = test(cycles, here).signum();
         let [first, middle, last] = [before, here, next].map(|orbit| sign * test(cycles, orbit));
         if !(middle < first && middle < last) || back == 0.0 || on == 0.0 {
@@ -156,7 +184,7 @@ fn touched(cycles: &Cycles<'_>, run: &Run, next: &Orbit) -> Option<(bool, Orbit)
 /// [`between`] where no test passes 0 twice.
 fn passed(cycles: &Cycles<'_>, here: &Orbit, next: &Orbit, run: &mut Run) {
     let mut found: Vec<(f64, Kind, Orbit, f64)> = Vec::new();
-    for (kind, test) in tests(cycles.of.closure) {
+    for (kind, test) in tests(cycles, next) {
         let values = [here, next].map(|one| test(cycles, one));
         let complex = |one: &Orbit| one.tests[0] > 0.0 && one.tests[1] > 0.0;
         let passes = values[0] * values[1] <= 0.0 && values[1] != 0.0;
@@ -165,7 +193,9 @@ fn passed(cycles: &Cycles<'_>, here: &Orbit, next: &Orbit, run: &mut Run) {
         }
         if let Some(orbit) = zero(cycles, here, next, *test) {
             let along = here.tangent.dot(&(&orbit.place - &here.place));
-            found.push((along, *kind, orbit, (values[1] - values[0]).signum()));
+            let negative = is_even(cycles, &orbit) && orbit.parts[0].trace() < 0.0;
+            let kind = if negative { Kind::PeriodDoubling } else { *kind };
+            found.push((along, kind, orbit, (values[1] - values[0]).signum()));
         }
     }
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -183,9 +213,10 @@ fn zero(cycles: &Cycles<'_>, a: &Orbit, b: &Orbit, test: Test) -> Option<Orbit> 
     let mut ends = [(0.0, test(cycles, a)), (1.0, test(cycles, b))];
     let mut best: Option<(f64, Orbit)> = None;
     let mut stayed = None;
+    let exact = if cycles.course.is_rough() { ROUGH } else { EXACT };
     for _ in 0..REFINEMENTS {
         let [(low, at_low), (high, at_high)] = ends;
-        if high - low < EXACT {
+        if high - low < exact {
             break;
         }
         let part = (low * at_high - high * at_low) / (at_high - at_low);
@@ -194,7 +225,7 @@ fn zero(cycles: &Cycles<'_>, a: &Orbit, b: &Orbit, test: Test) -> Option<Orbit> 
         let (part, orbit) = at(part).or_else(|| at(0.5 * (low + high)))?;
         let value = test(cycles, &orbit);
         let side = usize::from(value.signum() != at_low.signum());
-        let known = (part - ends[side].0).abs() < EXACT;
+        let known = (part - ends[side].0).abs() < exact;
         ends[side] = (part, value);
         if stayed == Some(side) {
             ends[1 - side].1 *= 0.5;

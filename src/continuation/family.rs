@@ -111,14 +111,29 @@ impl Family {
         cancel: &AtomicBool,
     ) -> Result<bool, Error> {
         let Some((of, points)) = self.type_of(orbit, at) else { return Ok(false) };
+        let from = self.branches.len();
+        let new = self.follow(of, &points, at, cancel)?;
+        self.grow(from, cancel)?;
+        Ok(new)
+    }
+
+    /// Adds the branch of this type through an orbit with these points, alone; whether there was one.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`] if `cancel` is set.
+    pub fn follow(
+        &mut self,
+        of: Type,
+        points: &[State],
+        at: f64,
+        cancel: &AtomicBool,
+    ) -> Result<bool, Error> {
         let cycles = self.cycles(of);
-        let first = cycles.near(&cycles.place(&points, at), &cycles.along());
+        let first = cycles.near(&cycles.place(points, at), &cycles.along());
         // Where friction holds the pendulum for ever, orbits are not isolated.
         let Some(first) = first.filter(|orbit| !orbit.stuck) else { return Ok(false) };
         let branch = cycles.both_ways(first, self.bounds, cancel)?;
-        let from = self.branches.len();
         self.branches.push(branch);
-        self.grow(from, cancel)?;
         Ok(true)
     }
 

@@ -59,7 +59,7 @@ impl Cycles<'_> {
                     all.push((half(about(opposite)), 1, difference(first, image(opposite))));
                 }
                 if symmetry == Some(Symmetry::HalfPeriod) && w == 0 && !even {
-                    let map = Period::<3>::new(self.course, &[self.at(&orbit.place)]);
+                    let map = Period::<3>::new(self.course, &self.coordinates(&orbit.place));
                     for one in map.images(&points[n / 2..=n / 2], 0.5) {
                         let apart = difference(first, image(one.state));
                         all.push((half(about(one.state)), 1, apart));
@@ -73,18 +73,23 @@ impl Cycles<'_> {
 
     /// The end of the branch between two orbits on one with more symmetry, and the orbit there.
     pub(super) fn meeting(&self, here: &Orbit, next: &Orbit) -> Option<(End, Orbit)> {
+        let (of, test, part) = self.met_type(here, next)?;
+        let between = interpolated(here, next, part);
+        let place = self.met((of, test), &between).unwrap_or(between);
+        let last = self.unfollowed(&place)?;
+        let end = if of.closure == Closure::Rest { End::Rest } else { End::Parent };
+        Some((end, Orbit { tangent: here.tangent.clone(), orientation: here.orientation, ..last }))
+    }
+
+    /// The type of the orbit that is met between two orbits, which of its tests vanishes there, and the part of the way.
+    pub(super) fn met_type(&self, here: &Orbit, next: &Orbit) -> Option<(Type, usize, f64)> {
         let both = [here, next].map(|orbit| self.special(orbit));
         let passes = |(a, b): &(&Special, &Special)| {
             let (a, b) = (a.2, b.2);
             (a.dot(&b) < 0.0 || b.norm() < NONE) && (a - b).norm() < NEAR
         };
         let (a, b) = both[0].iter().zip(&both[1]).find(passes)?;
-        let part = a.2.norm() / (a.2.norm() + b.2.norm());
-        let between = interpolated(here, next, part);
-        let place = self.met((a.0, a.1), &between).unwrap_or(between);
-        let last = self.unfollowed(&place)?;
-        let end = if a.0.closure == Closure::Rest { End::Rest } else { End::Parent };
-        Some((end, Orbit { tangent: here.tangent.clone(), orientation: here.orientation, ..last }))
+        Some((a.0, a.1, a.2.norm() / (a.2.norm() + b.2.norm())))
     }
 
     /// The orbit of another type near a place at which one of its tests vanishes, by the secant method, as an orbit of this

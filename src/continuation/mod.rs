@@ -9,16 +9,22 @@
 //! - `swing`: amplitudes
 //! - `transition`: where slips and sticks change
 //! - [`family`]: branches, and what they shed
+//! - [`critical`]: orbits with a critical multiplier in the plane of two coordinates; `normal_form`: which side the
+//!   new orbits live on; [`curve`]: curves of them; [`plane`]: all curves
 
 pub mod branch;
 mod closure;
 pub mod course;
+pub mod critical;
+pub mod curve;
 pub mod cycle;
 pub mod event;
 pub mod family;
 mod meeting;
+mod normal_form;
 pub mod period;
 pub mod phases;
+pub mod plane;
 pub mod shed;
 mod smooth;
 mod swing;

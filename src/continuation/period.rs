@@ -45,6 +45,8 @@ pub struct Period<'a, const N: usize> {
     course: &'a Course,
     at: Vec<f64>,
     pendulum: Pendulum,
+    /// Equal steps a period.
+    count: usize,
     /// The problem for any model; none where equal steps do.
     ode: Option<OdeProblem<Tangent<f64, N>>>,
 }
@@ -63,7 +65,21 @@ impl<'a, const N: usize> Period<'a, N> {
             // The derivative by a friction of strength 0 needs the turns.
             if course.varies_friction() { ode.finding_turns() } else { ode }
         });
-        Self { course, at: at.to_vec(), pendulum, ode }
+        let count = smooth::count(&pendulum, course.step);
+        Self { course, at: at.to_vec(), pendulum, count, ode }
+    }
+
+    /// The number of equal steps that [`Period::new`] takes.
+    #[must_use]
+    pub fn count(course: &Course, at: &[f64]) -> usize {
+        smooth::count(&course.pendulum(at), course.step)
+    }
+
+    /// This map by so many equal steps: one more for a larger parameter would make it jump.
+    #[must_use]
+    pub fn by(mut self, count: usize) -> Self {
+        self.count = count;
+        self
     }
 
     /// Whether the acceleration jumps with the sense of the motion, here or elsewhere on the course.
@@ -77,7 +93,7 @@ impl<'a, const N: usize> Period<'a, N> {
     pub fn images(&self, states: &[State], part: f64) -> Vec<Image> {
         let Some(ode) = &self.ode else {
             let product = Some((-self.pendulum.gamma * part * self.pendulum.period()).exp());
-            let carried = smooth::carry::<N>(self.course, &self.at, states, part);
+            let carried = smooth::carry::<N>(self.course, &self.at, states, part, self.count);
             return carried.iter().map(|end| Image::of(end, product)).collect();
         };
         states.iter().map(|state| self.carried(ode, *state, part)).collect()

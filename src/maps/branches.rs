@@ -86,7 +86,13 @@ pub fn branches(
         let part = (0.5 + 0.618_033_988_749_895 * k as f64).fract();
         let at = bounds.low + part * (bounds.high - bounds.low);
         let pendulum = family.pendulum(at);
-        let found = orbits::orbits(&pendulum, &window(&pendulum, request)?, control)?.closed;
+        let window = window(
+            &pendulum,
+            (request.n, request.w),
+            CELLS * request.n.min(FINER),
+            request.threads,
+        )?;
+        let found = orbits::orbits(&pendulum, &window, control)?.closed;
         let mut new = false;
         for orbit in &found {
             if !family.passes(orbit, at) {
@@ -102,11 +108,14 @@ pub fn branches(
 
 /// The box of a search: velocities to that of the rotation and of a fall from the top under the drive's largest
 /// acceleration.
-fn window(pendulum: &Pendulum, request: &Request) -> Result<Search, Error> {
-    let Request { n, w, threads, .. } = *request;
+pub(super) fn window(
+    pendulum: &Pendulum,
+    (n, w): (usize, i64),
+    cells: usize,
+    threads: usize,
+) -> Result<Search, Error> {
     let turning = w.unsigned_abs() as f64 / n as f64 * std::f64::consts::TAU / pendulum.period();
     let reach = turning + 2.0 * (1.0 + pendulum.drive.p.abs()).sqrt();
-    let cells = CELLS * n.min(FINER);
     let pi = std::f64::consts::PI;
     let theta = Axis::new("theta", -pi, pi, cells)?;
     let velocity = Axis::new("velocity", -reach, reach, cells)?;

@@ -1,24 +1,36 @@
-//! Critical amplitudes of a rest on a kink: its multipliers are continuous in `p`, not analytic.
+//! Critical amplitudes of a rest on a kink: its multipliers are continuous in `p`, not differentiable.
 
-use super::chebyshev::Values;
-use super::tongues::{Critical, bordered, gap, is_stable};
+use std::f64::consts::TAU;
+
+use super::tongues::{Row, bordered};
+use crate::model::Pendulum;
 use crate::orbit::brackets::{below, may_touch, zero};
+use crate::orbit::kink::QUICK;
+use crate::orbit::{KinkedRest, Multipliers};
 
-/// Samples of a part of the range of `p`.
+/// Samples of a part of the range of `p`, over which solutions grow at most by the exponential of about [`GROWTH`].
 const SAMPLES: usize = 32;
+const GROWTH: f64 = 8.0;
 /// Products of multipliers this near to 1 are not told from it.
 const ROUNDING: f64 = 1e-6;
 
-/// The critical amplitudes, and whether rest is stable before the first; `at` gives multipliers as
-/// a monodromy matrix.
-pub(super) fn critical(
-    parts: usize,
-    p_max: f64,
-    at: impl Fn(f64) -> Values<5>,
-) -> (Vec<Critical>, bool) {
+/// The critical amplitudes of a balance at a frequency.
+pub(super) fn row(pendulum: &Pendulum, balance: f64, omega: f64, p_max: f64) -> Row {
+    let mut driven = pendulum.clone();
+    driven.drive.omega = omega;
+    // Solutions grow by about the exponential of the period times the root of p.
+    let parts = (0.4 * TAU / omega * p_max.sqrt() / GROWTH).ceil().max(1.0) as usize;
+    let at = |p: f64| -> [f64; 2] {
+        let mut driven = driven.clone();
+        driven.drive.p = p.max(f64::MIN_POSITIVE);
+        let rest = KinkedRest::of(&driven, balance);
+        let Multipliers([a, b]) =
+            rest.map_or(Multipliers([0.0.into(); 2]), |r| r.multipliers(QUICK));
+        [(a + b).re, (a * b).re]
+    };
     let count = SAMPLES * parts;
     let places: Vec<f64> = (0..=count).map(|i| p_max * (i as f64 / count as f64).powi(2)).collect();
-    let values: Vec<Values<5>> = places.iter().map(|p| at(*p)).collect();
+    let values: Vec<[f64; 2]> = places.iter().map(|p| at(*p)).collect();
     let mut all = Vec::new();
     for multiplier in [1.0, -1.0] {
         let function = |p: f64| gap(multiplier, at(p));
@@ -26,9 +38,8 @@ pub(super) fn critical(
         all.extend(zeros(&places, &of, function).into_iter().map(|p| (p, multiplier)));
     }
     // Where directions turn for ever rest changes with the product alone.
-    let turning = |m: Values<5>| {
-        let complex = m[0] * m[0] < m[4];
-        if complex { 1.0 - m[4] } else { 1.0 }
+    let turning = |[sum, product]: [f64; 2]| {
+        if 0.25 * sum * sum < product { 1.0 - product } else { 1.0 }
     };
     for (p, both) in places.windows(2).zip(values.windows(2)) {
         let [left, right] = [both[0], both[1]].map(turning);
@@ -37,9 +48,18 @@ pub(super) fn critical(
             all.push((p, at(p)[0].signum()));
         }
     }
-    let (critical, stable_at_first) = bordered(all, p_max, |p| is_stable(at(p)));
-    let changes = |c: &Critical| c.stable[0] != c.stable[1];
-    (critical.into_iter().filter(changes).collect(), stable_at_first)
+    let stable = |p: f64| {
+        let m = at(p);
+        gap(1.0, m) > 0.0 && gap(-1.0, m) > 0.0 && m[1] < 1.0
+    };
+    let mut row = bordered(all, p_max, stable);
+    row.critical.retain(|c| c.stable[0] != c.stable[1]);
+    row
+}
+
+/// `1 - m (a + b) + a b`: zero where `m`, 1 or -1, is one of the multipliers.
+fn gap(multiplier: f64, [sum, product]: [f64; 2]) -> f64 {
+    1.0 - multiplier * sum + product
 }
 
 /// The zeros of a function with these values at these places, also pairs of them between two.

@@ -8,13 +8,12 @@
 //! - [`lyapunov`]: the largest exponent of the attractor that a start reaches; [`ensemble`], [`tangent_growth`]:
 //!   exponents of many trajectories
 //! - [`orbits`]: all periodic orbits of one period and winding; `multistart`: starting points of
-//!   Newton's method
-//! - [`branches`]: all branches of orbits of one type along a parameter
+//!   Newton's method; `every_orbit`: those of all periods and windings
+//! - [`branches`]: all branches of orbits of one type along a parameter; [`curves`]: the bifurcation set of a plane
 //! - [`parameter_map`]: the attractors over a plane of two parameters; [`survey`]: its blocks; [`cell`],
 //!   [`resolution`]: one pendulum of it, and its step length
 //! - [`bifurcation`]: the attractors along one parameter, and one followed up and down
-//! - [`tongues`]: critical amplitudes of the stability of rest, by `chebyshev`; `continuation`:
-//!   under a torque
+//! - [`tongues`]: critical amplitudes of the stability of rest
 //! - [`advance`]: plain integration of many starts
 //! - [`bounds`]: the number of periods within which a trajectory must settle
 //! - `stored`: plans and blocks as bytes
@@ -29,10 +28,10 @@ pub mod boundary_distance;
 pub mod bounds;
 pub mod branches;
 pub mod cell;
-mod chebyshev;
-mod continuation;
 pub mod control;
+pub mod curves;
 pub mod ensemble;
+mod every_orbit;
 pub mod finite_time;
 mod kinked_tongues;
 pub mod label;

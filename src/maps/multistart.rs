@@ -18,8 +18,6 @@ use crate::integrate::State;
 
 /// Number of times that a cell is quartered.
 const LEVELS: usize = 4;
-/// Largest number of cells that are quartered; above it the field is not resolved.
-const MOST_CELLS: usize = 60_000;
 /// Largest distance of a zero from the centre of its cell, in cells, by the linear part.
 const HALF: f64 = 0.75;
 /// A component whose sign is the same on all nodes, with a margin of this part of its range, has no zero in the cell.
@@ -48,14 +46,19 @@ struct Cell {
     corner: State,
     /// The zero of the linear part.
     aim: State,
+    /// The value that the first component has there.
+    goal: f64,
 }
 
-/// Points from which Newton's method should find all zeros in the box.
+/// Points from which Newton's method should find all zeros in the box; with a `period` all points at which the first
+/// component is a multiple of it. Above `most` cells the field is not resolved, and they are not quartered.
 ///
 /// # Errors
 /// Errors of `field`, which is evaluated at many points at once.
 pub(super) fn places(
     axes: [Axis; 2],
+    period: Option<f64>,
+    most: usize,
     mut field: impl FnMut(&[State]) -> Result<Vec<State>, Error>,
 ) -> Result<Vec<State>, Error> {
     let [theta, velocity] = axes;
@@ -73,11 +76,14 @@ pub(super) fn places(
         for i in 0..theta.count {
             let patch = |k: usize| values[(j + k / 4) * columns + i + k % 4];
             let corner = nodes[(j + 1) * columns + i + 1];
-            cells.extend(judge(corner, size, &std::array::from_fn(patch)));
+            let patch: Patch = std::array::from_fn(patch);
+            for goal in goals(&patch, period) {
+                cells.extend(judge(corner, size, &patch, goal));
+            }
         }
     }
     for _ in 0..LEVELS {
-        if cells.len() > MOST_CELLS {
+        if cells.len() > most {
             break;
         }
         let half = size.map(|s| 0.5 * s);
@@ -91,12 +97,13 @@ pub(super) fn places(
         let nodes: Vec<State> = cells.iter().flat_map(around).collect();
         let values = field(&nodes)?;
         let mut smaller = Vec::new();
-        for (nodes, values) in nodes.chunks_exact(25).zip(values.chunks_exact(25)) {
+        let patches = nodes.chunks_exact(25).zip(values.chunks_exact(25)).zip(&cells);
+        for ((nodes, values), cell) in patches {
             for quarter in 0..4 {
                 let (i, j) = (quarter % 2, quarter / 2);
                 let patch = |k: usize| values[(j + k / 4) * 5 + i + k % 4];
                 let corner = nodes[(j + 1) * 5 + i + 1];
-                smaller.extend(judge(corner, half, &std::array::from_fn(patch)));
+                smaller.extend(judge(corner, half, &std::array::from_fn(patch), cell.goal));
             }
         }
         (cells, size) = (smaller, half);
@@ -104,8 +111,19 @@ pub(super) fn places(
     Ok(cells.iter().map(|cell| cell.aim).collect())
 }
 
-/// The cell, if the field may vanish in it.
-fn judge(corner: State, size: [f64; 2], patch: &Patch) -> Option<Cell> {
+/// The multiples of the period that the first component may have in a cell.
+fn goals(patch: &Patch, period: Option<f64>) -> Vec<f64> {
+    let Some(period) = period else { return vec![0.0] };
+    let all = || patch.iter().map(|value| value[0]);
+    let (low, high) = (all().fold(f64::INFINITY, f64::min), all().fold(-f64::INFINITY, f64::max));
+    let spare = CLEAR * (high - low);
+    let [from, to] = [(low - spare) / period, (high + spare) / period];
+    (from.ceil() as i64..=to.floor() as i64).map(|k| k as f64 * period).collect()
+}
+
+/// The cell, if the first component may be `goal` in it and the second one 0.
+fn judge(corner: State, size: [f64; 2], patch: &Patch, goal: f64) -> Option<Cell> {
+    let patch = patch.map(|[first, second]| [first - goal, second]);
     let [mut low, mut high] = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
     for value in patch.iter().flatten().zip([0, 1].into_iter().cycle()) {
         let (value, k) = value;
@@ -124,7 +142,7 @@ fn judge(corner: State, size: [f64; 2], patch: &Patch) -> Option<Cell> {
     let mean = 0.25 * (value(5) + value(6) + value(9) + value(10));
     let along = 0.5 * (value(6) + value(10) - value(5) - value(9));
     let up = 0.5 * (value(9) + value(10) - value(5) - value(6));
-    let unresolved = Some(Cell { corner, aim: centre });
+    let unresolved = Some(Cell { corner, aim: centre, goal });
     let Some(inverse) = Matrix2::from_columns(&[along, up]).try_inverse() else {
         return unresolved;
     };
@@ -143,7 +161,7 @@ fn judge(corner: State, size: [f64; 2], patch: &Patch) -> Option<Cell> {
     }
     // At most to the cell's edge: the linear part is unknown beyond.
     let aim = [0, 1].map(|k| centre[k] - from_centre[k].clamp(-1.0, 1.0) * size[k]);
-    Some(Cell { corner, aim })
+    Some(Cell { corner, aim, goal })
 }
 
 /// A start during the iteration.

@@ -25,6 +25,8 @@ use crate::orbit::symmetry::Mirror;
 
 /// The longest period of a request, in forcing periods.
 pub const LONGEST: usize = 64;
+/// Largest number of cells that are quartered.
+const MOST_CELLS: usize = 60_000;
 /// Error of the displacements after five periods, used for starting points only.
 const TOLERANCE: f64 = 1e-6;
 /// Memory of a cell, bytes: its corner, its image, and intermediate results.
@@ -102,15 +104,6 @@ pub fn orbits(pendulum: &Pendulum, request: &Request, control: &Control) -> Resu
     }
     let map = PoincareMap::new(pendulum);
     let mirror = Mirror::of(pendulum);
-    let rubs = pendulum.has_friction();
-    let equation = pendulum.equation();
-    // Newton's method leaves a velocity of the size of rounding, and creeps to the edge of the held
-    // set: there, too, neighbours remain at rest, and a multiplier is 1.
-    let held = |orbit: &PeriodicOrbit| {
-        let creeps = (orbit.multipliers.largest() - 1.0).abs() < CREEPS;
-        let stays = |p: &State| p[1].abs() < STILL && (creeps || equation.holds_for_ever(p[0]));
-        rubs && orbit.points.iter().any(stays)
-    };
     let cell = |axis: Axis| (axis.high - axis.low) / axis.count as f64;
     let reach = LEAST_REACH.max(REACH_CELLS * cell(request.theta).hypot(cell(request.velocity)));
     let begin = if pendulum.is_autonomous() {
@@ -138,7 +131,7 @@ pub fn orbits(pendulum: &Pendulum, request: &Request, control: &Control) -> Resu
             pool.install(|| next.par_iter().map(search).collect::<Result<_, Error>>())?;
         let before = all.len();
         for orbit in found.into_iter().flatten() {
-            if held(&orbit) {
+            if is_held(pendulum, &orbit) {
                 continue;
             }
             let image = mirror.as_ref().and_then(|m| Some(m.orbit(&map, &orbit)?.0));
@@ -161,6 +154,18 @@ pub fn orbits(pendulum: &Pendulum, request: &Request, control: &Control) -> Resu
         asked && orbit.points.iter().any(inside)
     });
     Ok(Orbits { closed: all, begun, ..none })
+}
+
+/// Whether friction holds the orbit. Newton's method leaves a velocity of the size of rounding, and creeps to the edge of
+/// the held set: there, too, neighbours remain at rest, and a multiplier is 1.
+pub(super) fn is_held(pendulum: &Pendulum, orbit: &PeriodicOrbit) -> bool {
+    if !pendulum.has_friction() {
+        return false;
+    }
+    let equation = pendulum.equation();
+    let creeps = (orbit.multipliers.largest() - 1.0).abs() < CREEPS;
+    let stays = |p: &State| p[1].abs() < STILL && (creeps || equation.holds_for_ever(p[0]));
+    orbit.points.iter().any(stays)
 }
 
 /// Equilibria of an undriven pendulum: other orbits close after a given time only by coincidence.
@@ -205,7 +210,7 @@ fn beginnings(
         };
         Ok(from.iter().zip(ends).map(gap).collect())
     };
-    let places = places([request.theta, request.velocity], &displacements)?;
+    let places = places([request.theta, request.velocity], None, MOST_CELLS, &displacements)?;
     approach(&places, reach, displacements)
 }
 

@@ -1,118 +1,96 @@
-//! Critical amplitudes at which hanging or inverted rest loses or gains stability, by Floquet
-//! theory.
+//! Critical amplitudes at which hanging or inverted rest loses or gains stability: events of the branch of rest along the
+//! drive's amplitude `p`, at each frequency, and the curves through them in the plane of both.
 //!
-//! The derivative `M` of the stroboscopic map at rest is the monodromy matrix of the linearised
-//! equation, eq. 1.3 with damping, with the opposite sign of gravity upright. Rest changes where a multiplier passes +1,
-//! `1 - tr M + det M = 0`, or -1, `1 + tr M + det M = 0`. As `p` stands in the linear equation linearly,
-//! `M` is an entire function of it: its Chebyshev series on an interval soon says all about it.
-//!
-//! Under a constant torque rest is a periodic orbit; `continued` follows it.
-//!
-//! Without damping the two boundaries of a narrow tongue are nearly a double zero of that. The drive is
-//! even in time then, so that `m11 = m22` and, on a boundary, `m12 m21 = m11^2 - 1 = 0`: one is a
-//! simple zero of `m12`, the other of `m21`, however narrow the tongue (Magnus & Winkler 1966, Hill's
-//! equation, section 1.1).
+//! A constant torque turns rest into an orbit of the drive's period. It is followed from rest along the torque, then along
+//! `p`, from both ends of the range and from the doublings, which curves over `p` and the torque lead to: a stable interval
+//! may shift by more than its length.
 
 use std::f64::consts::PI;
+use std::sync::atomic::AtomicBool;
 
 use rayon::prelude::*;
 
-use super::chebyshev::{Interpolant, Values};
-use super::continuation;
 use super::control::{Control, pool};
 use super::kinked_tongues;
+use crate::continuation::branch::Bounds;
+use crate::continuation::course::{Course, Law};
+use crate::continuation::critical::Critical as Place;
+use crate::continuation::cycle::{Closure, Orbit, Type};
+use crate::continuation::event::Kind;
+use crate::continuation::family::Family;
+use crate::continuation::plane::{Plane, Seed};
 use crate::error::Error;
-use crate::model::Pendulum;
-use crate::orbit::fold::{Fold, fold_of_onset};
-use crate::orbit::kink::QUICK;
-use crate::orbit::{KinkedRest, PoincareMap};
+use crate::integrate::State;
+use crate::model::pendulum::Symmetry;
+use crate::model::{Parameter, Pendulum};
+use crate::orbit::{KinkedRest, PoincareMap, newton};
 
 /// Largest `p` of a request, in squares of the lowest frequency: at it solutions grow over a period by about
 /// the exponential of 560, and twice that is beyond the range of numbers.
 const MOST_P: f64 = 5e4;
-/// Over a part of the range of `p` solutions grow at most by the exponential of about this.
-const GROWTH: f64 = 8.0;
-/// Relative difference below which entries, or products of multipliers, are equal.
+/// Relative difference below which products of multipliers are equal.
 const ALIKE: f64 = 1e-9;
-/// Largest load on the pendulum at rest that is rounding.
+/// Largest load on the pendulum at rest that is rounding, and number of times in a period at which it is sampled.
 const NO_LOAD: f64 = 1e-13;
-/// Number of times in a period at which the load is sampled.
 const TIMES: usize = 16;
+/// A tongue whose tip is at `p = 0` begins below this part of the range.
+const TIP: f64 = 1e-12;
+/// Longest period of the orbits whose folds are followed from points of codimension 2.
+const BORN: usize = 2;
+/// The coordinate along `p`, and along the torque.
+const WHOLE: Bounds = Bounds { low: 0.0, high: 1.0 };
+/// Largest distance of Newton's method from the end of a branch.
+const NEAR: f64 = 1e-3;
+/// The type of what rest becomes under a torque.
+const ORBIT: Type = Type { n: 1, w: 0, closure: Closure::Whole, centre: 0.0 };
+/// Angles of hanging and of inverted rest.
+const BALANCES: [f64; 2] = [0.0, PI];
 
-/// The two angles at which gravity has no torque.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Balance {
-    /// Angle 0.
-    Hanging,
-    /// Angle pi.
-    Inverted,
-}
-
-impl Balance {
-    /// Its angle.
-    #[must_use]
-    pub fn angle(self) -> f64 {
-        if self == Self::Hanging { 0.0 } else { PI }
-    }
-}
-
-/// A critical amplitude. Under a torque the orbit that continues rest ceases where its
-/// multiplier is 1.
+/// A critical amplitude.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Critical {
     /// Amplitude of the drive.
     pub p: f64,
-    /// The critical multiplier: 1 or -1.
+    /// The critical multiplier: 1 or -1. Under a torque an orbit has a fold where it is 1.
     pub multiplier: f64,
     /// Whether rest is stable just below, and just above.
     pub stable: [bool; 2],
 }
 
-/// Critical amplitudes at one frequency.
-#[derive(Clone, Debug)]
-pub struct Curve {
-    /// Frequency of the drive.
-    pub omega: f64,
+/// Critical amplitudes of a rest at one frequency.
+#[derive(Clone, Debug, Default)]
+pub struct Row {
     /// In order of `p`.
     pub critical: Vec<Critical>,
     /// Whether rest is stable between `p = 0` and the first of them.
     pub stable_at_first: bool,
-    /// Where the oscillation that is born at the first loss of stability turns back: below that `p`
-    /// it is not. `None` where it is born toward larger `p`, and under a torque.
-    pub fold: Option<Fold>,
 }
 
-impl Curve {
-    /// The intervals of stable rest.
-    pub(super) fn stable_intervals(&self, p_max: f64) -> Vec<[f64; 2]> {
-        let inner = self.critical.iter().map(|c| c.p);
-        let ends: Vec<f64> = [0.0].into_iter().chain(inner).chain([p_max]).collect();
-        let above = self.critical.iter().map(|c| c.stable[1]);
-        let stable = [self.stable_at_first].into_iter().chain(above);
-        let of_both = ends.windows(2).zip(stable).filter(|(_, yes)| *yes);
-        of_both.map(|(both, _)| [both[0], both[1]]).collect()
-    }
+/// The critical amplitudes and the curves.
+#[derive(Clone, Debug)]
+pub struct Tongues {
+    /// Those of hanging and of inverted rest, at each frequency.
+    pub rows: Vec<[Row; 2]>,
+    /// Whether upright is a rest.
+    pub inverted: bool,
+    /// The curves over `p` and the frequency from 0 to 1; none at one frequency, and none of a rest that is no orbit of
+    /// a smooth map with the pendulum's symmetry.
+    pub plane: Option<Plane>,
 }
 
-/// A function of the monodromy matrix and its product that vanishes at critical amplitudes.
-type Vanishing = fn(Values<5>) -> f64;
-
-/// All critical amplitudes of a balance up to `p_max` at each of the frequencies, with `folds` of
-/// oscillations of hanging rest if asked for.
+/// All critical amplitudes up to `p_max` at each of the frequencies, which rise.
 ///
 /// # Errors
 /// [`Error::Range`] for a `p_max` or frequency out of range, [`Error::NotMappable`] for effects that no
-/// map can have, [`Error::NoRest`] where rest is no solution, or friction holds it,
+/// map can have, [`Error::NoRest`] where hanging rest is no solution, or friction holds it,
 /// [`Error::Interrupted`] if `control` was cancelled.
 pub fn tongues(
     pendulum: &Pendulum,
-    balance: Balance,
     omegas: &[f64],
     p_max: f64,
-    folds: bool,
     threads: usize,
     control: &Control,
-) -> Result<Vec<Curve>, Error> {
+) -> Result<Tongues, Error> {
     if let Some(value) = omegas.iter().find(|w| !(w.is_finite() && **w > 0.0)) {
         return Err(Error::Range { name: "omega", value: *value, allowed: "a number above 0" });
     }
@@ -122,33 +100,26 @@ pub fn tongues(
         return Err(Error::Range { name: "p_max", value: p_max, allowed });
     }
     let mut level = pendulum.clone();
-    level.torque = 0.0;
-    check(&level, balance, omegas, p_max)?;
+    (level.torque, level.drive.phase) = (0.0, 0.0);
+    check(&level, BALANCES[0], omegas, p_max)?;
+    let inverted = check(&level, BALANCES[1], omegas, p_max).is_ok();
+    let asked = Asked { level, torque: pendulum.torque, p_max, inverted };
     control.begin(omegas.len());
-    pool(threads)?.install(|| {
-        let one = |omega: &f64| {
-            control.check()?;
-            let moved = pendulum.torque != 0.0;
-            let mut curve = along(&level, balance, *omega, p_max, folds && !moved);
-            if moved {
-                curve = continuation::curve(pendulum, balance, &curve, p_max);
-            }
-            control.add(1);
-            Ok(curve)
-        };
-        omegas.par_iter().map(one).collect()
-    })
-}
-
-/// This pendulum with another drive.
-pub(super) fn under(pendulum: &Pendulum, p: f64, omega: f64) -> Pendulum {
-    let mut other = pendulum.clone();
-    (other.drive.p, other.drive.omega, other.drive.phase) = (p, omega, 0.0);
-    other
+    let one = |omega: &f64| {
+        control.check()?;
+        let found = asked.at(*omega, control.flag());
+        control.add(1);
+        found
+    };
+    let found: Vec<([Row; 2], Vec<Seed>)> =
+        pool(threads)?.install(|| omegas.par_iter().map(one).collect::<Result<_, Error>>())?;
+    let (rows, seeds): (Vec<_>, Vec<_>) = found.into_iter().unzip();
+    let plane = asked.plane(omegas, &seeds, control.flag())?;
+    Ok(Tongues { rows, inverted, plane })
 }
 
 /// Whether rest is a solution with all these drives, and not held by friction.
-fn check(pendulum: &Pendulum, balance: Balance, omegas: &[f64], p_max: f64) -> Result<(), Error> {
+fn check(pendulum: &Pendulum, balance: f64, omegas: &[f64], p_max: f64) -> Result<(), Error> {
     pendulum.check_mappable()?;
     if pendulum.has_friction() {
         let why = "friction holds it whatever the drive, and rest never loses its stability: take theta_r = 0 \
@@ -159,7 +130,7 @@ fn check(pendulum: &Pendulum, balance: Balance, omegas: &[f64], p_max: f64) -> R
         let driven = under(pendulum, p_max, *omega);
         let loaded = (0..TIMES).any(|k| {
             let tau = driven.period() * k as f64 / TIMES as f64;
-            driven.acceleration(tau, balance.angle(), 0.0).abs() > NO_LOAD
+            driven.acceleration(tau, balance, 0.0).abs() > NO_LOAD
         });
         if loaded {
             let why =
@@ -170,86 +141,211 @@ fn check(pendulum: &Pendulum, balance: Balance, omegas: &[f64], p_max: f64) -> R
     Ok(())
 }
 
-/// Entries of the monodromy matrix by rows, and its determinant; at a kink those of a diagonal matrix with its
-/// multipliers, whose sum is real.
-fn monodromy(pendulum: &Pendulum, balance: Balance, p: f64, omega: f64) -> Values<5> {
-    // Without drive the period is arbitrary: so small a drive changes nothing.
-    let driven = under(pendulum, p.max(f64::MIN_POSITIVE), omega);
-    if let Some(rest) = KinkedRest::of(&driven, balance.angle()) {
-        let [a, b] = rest.multipliers(QUICK).0;
-        let half = 0.5 * (a + b).re;
-        return [half, 0.0, 0.0, half, (a * b).re];
+/// This pendulum with another drive.
+fn under(pendulum: &Pendulum, p: f64, omega: f64) -> Pendulum {
+    let mut other = pendulum.clone();
+    (other.drive.p, other.drive.omega) = (p.max(f64::MIN_POSITIVE), omega);
+    other
+}
+
+/// What is asked at each frequency.
+struct Asked {
+    /// The pendulum without torque.
+    level: Pendulum,
+    torque: f64,
+    p_max: f64,
+    inverted: bool,
+}
+
+impl Asked {
+    /// The critical amplitudes of both rests at a frequency, and points of curves.
+    fn at(&self, omega: f64, cancel: &AtomicBool) -> Result<([Row; 2], Vec<Seed>), Error> {
+        if KinkedRest::of(&under(&self.level, self.p_max, omega), BALANCES[0]).is_some() {
+            let row = |balance: f64| kinked_tongues::row(&self.level, balance, omega, self.p_max);
+            let upright = if self.inverted { row(BALANCES[1]) } else { Row::default() };
+            return Ok(([row(BALANCES[0]), upright], Vec::new()));
+        }
+        let mut family = self.along_p(&self.level, omega)?;
+        let balances = &BALANCES[..1 + usize::from(self.inverted)];
+        for centre in balances {
+            let of = Type { n: 1, w: 0, closure: Closure::Rest, centre: *centre };
+            family.follow(of, &[[*centre, 0.0]], 0.0, cancel)?;
+        }
+        if self.torque != 0.0 {
+            family = self.moved(&family, omega, cancel)?;
+        }
+        let mut seeds = Vec::new();
+        let rows = BALANCES.map(|balance| {
+            let critical = self.events(&family, balance, &mut seeds);
+            bordered(critical, self.p_max, |p| is_stable(&family, balance, p / self.p_max))
+        });
+        Ok((rows, seeds))
     }
-    let map = PoincareMap::new(&driven);
-    let image = map.once([balance.angle(), 0.0]);
-    let m = image.derivative;
-    let product = image.product.unwrap_or(m.determinant());
-    [m[(0, 0)], m[(0, 1)], m[(1, 0)], m[(1, 1)], product]
-}
 
-/// `1 - m tr M + det M`: zero where `m`, 1 or -1, is a multiplier.
-pub(super) fn gap(multiplier: f64, [a, _, _, d, product]: Values<5>) -> f64 {
-    1.0 - multiplier * (a + d) + product
-}
-
-pub(super) fn is_stable(m: Values<5>) -> bool {
-    let within = gap(1.0, m) > 0.0 && gap(-1.0, m) > 0.0;
-    within && m[4] < 1.0 + ALIKE
-}
-
-fn along(pendulum: &Pendulum, balance: Balance, omega: f64, p_max: f64, folds: bool) -> Curve {
-    let at = |p: f64| monodromy(pendulum, balance, p, omega);
-    // Solutions grow by about the exponential of the period times the root of p.
-    let period = std::f64::consts::TAU / omega;
-    let parts = (0.4 * period * p_max.sqrt() / GROWTH).ceil().max(1.0) as usize;
-    let end = |i: usize| p_max * (i as f64 / parts as f64).powi(2);
-    if KinkedRest::of(&under(pendulum, p_max, omega), balance.angle()).is_some() {
-        let (critical, stable_at_first) = kinked_tongues::critical(parts, p_max, at);
-        return Curve { omega, critical, stable_at_first, fold: None };
+    /// No branches along `p` yet.
+    fn along_p(&self, pendulum: &Pendulum, omega: f64) -> Result<Family, Error> {
+        let law = Law::Quadratic([0.0, self.p_max, 0.0]);
+        let base = under(pendulum, self.p_max, omega);
+        Family::new(Course::new(base, vec![vec![(Parameter::P, law)]]), WHOLE, 0)
     }
-    let mut critical: Vec<(f64, f64)> = Vec::new();
-    let mut panels = Vec::new();
-    for i in 0..parts {
-        let panel = Interpolant::of(end(i), end(i + 1), at);
-        let begin: Values<5> = std::array::from_fn(|k| panel.value(k, end(i)));
-        let even = (begin[0] - begin[3]).abs() < ALIKE * (1.0 + begin[0].abs())
-            && (begin[4] - 1.0).abs() < ALIKE;
-        let functions: [(f64, Vanishing); 2] = if even {
-            [(0.0, |m| m[1]), (0.0, |m| m[2])]
-        } else {
-            [(1.0, |m| gap(1.0, m)), (-1.0, |m| gap(-1.0, m))]
-        };
-        for (multiplier, function) in functions {
-            for zero in panel.zeros(function) {
-                let p = corrected(&panel, zero, function, at);
-                let sign = if even { panel.value(0, zero).signum() } else { multiplier };
-                critical.push((p.clamp(0.0, p_max), sign));
+
+    /// Amplitudes and multipliers of the events about a balance; adds them to the seeds.
+    fn events(&self, family: &Family, balance: f64, seeds: &mut Vec<Seed>) -> Vec<(f64, f64)> {
+        let mut critical = Vec::new();
+        for branch in &family.branches {
+            let cycles = family.cycles(branch.of);
+            for event in &branch.run.events {
+                let multiplier = match event.kind {
+                    Kind::Fold | Kind::SymmetryBreaking => 1.0,
+                    Kind::PeriodDoubling => -1.0,
+                    _ => continue,
+                };
+                let place = &branch.run.orbits[event.orbit].place;
+                let (at, points) = (cycles.at(place), cycles.points(place));
+                if at < TIP || !is_about(balance, points[0]) {
+                    continue;
+                }
+                critical.push((at * self.p_max, multiplier));
+                let (of, kind) = (branch.of, event.kind);
+                seeds.push(Seed { of, kind, points, at: [at, 0.0], along: 1 });
             }
         }
-        panels.push((end(i + 1), panel));
+        critical
     }
-    let stable = |p: f64| {
-        let panel = panels.iter().find(|(end, _)| p <= *end).map_or(&panels[0].1, |(_, one)| one);
-        is_stable(std::array::from_fn(|k| panel.value(k, p)))
-    };
-    let (critical, stable_at_first) = bordered(critical, p_max, stable);
-    let onset = critical.iter().find(|c| c.stable == [true, false]);
-    let mirrored = pendulum.is_mirror_symmetric();
-    let fold = onset
-        .filter(|c| {
-            folds && balance == Balance::Hanging && c.p > 0.0 && (mirrored || c.multiplier > 0.0)
-        })
-        .and_then(|c| fold_of_onset(&under(pendulum, c.p, omega), c.multiplier));
-    Curve { omega, critical, stable_at_first, fold }
+
+    /// The branches along `p` of the orbits that rests become under the torque.
+    fn moved(&self, level: &Family, omega: f64, cancel: &AtomicBool) -> Result<Family, Error> {
+        let mut pendulum = self.level.clone();
+        pendulum.torque = self.torque;
+        let mut family = self.along_p(&pendulum, omega)?;
+        let mut starts = self.doubled(level, omega, cancel)?;
+        for rest in &level.branches {
+            for at in [0.0, 1.0] {
+                let start = self.carried(rest.of.centre, at, omega, cancel)?;
+                starts.extend(start.map(|start| (at, start)));
+            }
+        }
+        for (at, start) in starts {
+            let map = PoincareMap::new(&family.pendulum(at));
+            let Some(orbit) = newton::find(&map, start, 1, NEAR) else { continue };
+            if !family.passes(&orbit, at) {
+                family.follow(ORBIT, &[start], at, cancel)?;
+            }
+        }
+        Ok(family)
+    }
+
+    /// Doubled orbits under the torque, at parts of the range of `p`: ends of the curves of doublings over `p` and the torque
+    /// that begin at those of rests.
+    fn doubled(
+        &self,
+        level: &Family,
+        omega: f64,
+        cancel: &AtomicBool,
+    ) -> Result<Vec<(f64, State)>, Error> {
+        let mut course = self.along_torque(0.0, omega);
+        let law = Law::Quadratic([0.0, self.p_max, 0.0]);
+        course.axes.insert(0, vec![(Parameter::P, law)]);
+        let mut plane = Plane::new(course, 1)?;
+        let mut seeds = Vec::new();
+        for centre in BALANCES {
+            self.events(level, centre, &mut seeds);
+        }
+        for seed in seeds.into_iter().filter(|seed| seed.kind == Kind::PeriodDoubling) {
+            plane.add(&Seed { of: ORBIT, ..seed }, cancel)?;
+        }
+        let mut starts = Vec::new();
+        for curve in &plane.curves {
+            let critical = plane.critical(curve.of, curve.kind);
+            for point in curve.points.first().into_iter().chain(curve.points.last()) {
+                let [at, torque] = Place::at(&point.orbit.place);
+                if torque > 0.5 {
+                    starts.push((at, critical.points(&point.orbit.place)[0]));
+                }
+            }
+        }
+        Ok(starts)
+    }
+
+    /// The course along the torque at a part of the range of `p`.
+    fn along_torque(&self, at: f64, omega: f64) -> Course {
+        let law = Law::Quadratic([0.0, self.torque, 0.0]);
+        let base = under(&self.level, at * self.p_max, omega);
+        Course::new(base, vec![vec![(Parameter::Torque, law)]])
+    }
+
+    /// A point of the orbit that rest becomes as the torque grows from 0; none if it ends before.
+    fn carried(
+        &self,
+        centre: f64,
+        at: f64,
+        omega: f64,
+        cancel: &AtomicBool,
+    ) -> Result<Option<State>, Error> {
+        let family = Family::new(self.along_torque(at, omega), WHOLE, 0)?;
+        let cycles = family.cycles(ORBIT);
+        let place = cycles.place(&[[centre, 0.0]], 0.0);
+        let Some(first) = cycles.near(&place, &cycles.along()) else { return Ok(None) };
+        let (run, _) = cycles.followed(&first, WHOLE, cancel)?;
+        let last = run.orbits.last().filter(|last| cycles.at(&last.place) == 1.0);
+        Ok(last.map(|last| cycles.points(&last.place)[0]))
+    }
+
+    /// The curves through the events at all frequencies.
+    fn plane(
+        &self,
+        omegas: &[f64],
+        seeds: &[Vec<Seed>],
+        cancel: &AtomicBool,
+    ) -> Result<Option<Plane>, Error> {
+        let (Some(low), Some(high)) = (omegas.first(), omegas.last()) else { return Ok(None) };
+        if low >= high {
+            return Ok(None);
+        }
+        let mut base = self.level.clone();
+        base.torque = self.torque;
+        let law = |low: f64, high: f64| Law::Quadratic([low, high - low, 0.0]);
+        let axes = vec![
+            vec![(Parameter::P, law(0.0, self.p_max))],
+            vec![(Parameter::Omega, law(*low, *high))],
+        ];
+        let mut plane = Plane::new(Course::new(base, axes), BORN)?;
+        let kinked = KinkedRest::of(&under(&self.level, self.p_max, *low), BALANCES[0]).is_some();
+        if kinked || (self.torque == 0.0 && plane.symmetry != Some(Symmetry::AtOnce)) {
+            return Ok(None);
+        }
+        for (omega, seeds) in omegas.iter().zip(seeds) {
+            for seed in seeds {
+                let at = [seed.at[0], (omega - low) / (high - low)];
+                plane.add(&Seed { at, ..seed.clone() }, cancel)?;
+            }
+        }
+        Ok(Some(plane))
+    }
 }
 
-/// Critical amplitudes in order, each with the stability on both sides, and that before the first; `stable`
-/// tells it between two of them.
+/// Whether a state is nearer to one balance than to the other.
+fn is_about(balance: f64, state: State) -> bool {
+    (state[0] - balance).cos() > 0.0
+}
+
+/// Whether a branch has a stable orbit about a balance at this coordinate.
+fn is_stable(family: &Family, balance: f64, at: f64) -> bool {
+    let stable =
+        |orbit: &Orbit| orbit.tests.iter().all(|test| *test > 0.0) && orbit.product.0 < 1.0 + ALIKE;
+    family.branches.iter().any(|branch| {
+        let cycles = family.cycles(branch.of);
+        let own = |orbit: &Orbit| is_about(balance, cycles.points(&orbit.place)[0]);
+        branch.at(&cycles, at).iter().any(|orbit| own(orbit) && stable(orbit))
+    })
+}
+
+/// Critical amplitudes in order, each with the stability on both sides; `stable` tells it between two of them.
 pub(super) fn bordered(
     mut critical: Vec<(f64, f64)>,
     p_max: f64,
     stable: impl Fn(f64) -> bool,
-) -> (Vec<Critical>, bool) {
+) -> Row {
     critical.sort_by(|a, b| a.0.total_cmp(&b.0));
     let inner = critical.iter().map(|c| c.0);
     let ends: Vec<f64> = [0.0].into_iter().chain(inner).chain([p_max]).collect();
@@ -260,20 +356,6 @@ pub(super) fn bordered(
         multiplier: *multiplier,
         stable: [both[0], both[1]],
     };
-    (critical.iter().zip(between.windows(2)).map(with_sides).collect(), between[0])
-}
-
-/// A zero of the interpolant, corrected by one step of Newton's method on the function itself.
-fn corrected(
-    panel: &Interpolant<5>,
-    zero: f64,
-    function: fn(Values<5>) -> f64,
-    at: impl Fn(f64) -> Values<5>,
-) -> f64 {
-    let width = 1e-5 * zero.max(1e-3);
-    let side = |by: f64| function(std::array::from_fn(|k| panel.value(k, zero + by)));
-    let slope = (side(width) - side(-width)) / (2.0 * width);
-    let step = function(at(zero)) / slope;
-    // At a tip the slope vanishes, and no correction is possible.
-    if step.abs() < width { zero - step } else { zero }
+    let rows = critical.iter().zip(between.windows(2)).map(with_sides).collect();
+    Row { critical: rows, stable_at_first: between[0] }
 }

@@ -2,7 +2,6 @@
 
 pub mod brackets;
 pub mod floquet;
-pub mod fold;
 pub mod kink;
 pub mod newton;
 pub mod poincare;

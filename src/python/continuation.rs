@@ -70,7 +70,7 @@ pub fn continuation(
     };
     let axis = parameters.into_iter().map(one).collect::<Result<_, Error>>().map_err(raise)?;
     let [low, high] = [places.first(), places.last()].map(|end| end.copied().unwrap_or(f64::NAN));
-    let course = Course { base, axes: vec![axis] };
+    let course = Course::new(base, vec![axis]);
     let (n, w) = winding;
     let start = start.map(|(theta, velocity, at)| ([theta, velocity], at));
     let request = Request { n, w, longest, start, threads };

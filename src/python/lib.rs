@@ -5,6 +5,7 @@
 
 mod continuation;
 mod convert;
+mod curves;
 mod exponents;
 mod fit;
 mod library;
@@ -106,7 +107,9 @@ mod _core {
         Diverged, bounds,
         continuation::{Continuation, continuation},
         convert::Attractor,
-        counts_turns, default_threads,
+        counts_turns,
+        curves::{BifurcationSet, bifurcation_set},
+        default_threads,
         exponents::{Ensemble, Lyapunov, growth, lyapunov},
         fit::{Fit, FitPoint, FittedRun, WindowRows, fit_rows, fit_runs, replay},
         kinds,
@@ -117,7 +120,7 @@ mod _core {
         parameter_maps::{Bifurcation, Followed, ParameterMap, parameter_names},
         period, reckon, simd, simd_available,
         surveys::Survey,
-        tongues::{CriticalAmplitudes, tongues},
+        tongues::{Tongues, tongues},
     };
 
     #[pymodule_init]

@@ -1,76 +1,61 @@
 //! Bindings of critical curves.
 
-use pendmap::error::Error;
-use pendmap::maps::tongues::{Balance, Critical, tongues as search};
+use pendmap::maps::tongues::tongues as search;
 use pyo3::prelude::*;
 
+use super::convert::{Array, array};
+use super::curves::BifurcationSet;
 use super::long_calls::interruptible;
 use super::model::Model;
 
-/// Critical amplitudes of the drive at one frequency, ascending.
+/// Critical amplitudes of the drive as columns, by frequency, of hanging rest before inverted rest, ascending.
 #[pyclass(frozen, get_all, module = "pendmap._core")]
-#[derive(Default)]
-pub struct CriticalAmplitudes {
-    /// Whether rest is a solution.
-    rest: bool,
-    p: Vec<f64>,
-    /// The Floquet multiplier, 1 or -1, at each of them.
-    multiplier: Vec<f64>,
-    /// Whether rest is stable below the first of them, and above each.
-    stable: Vec<bool>,
-    /// Whether a torque moves the angle of rest.
-    moved: bool,
-    /// Amplitude, angle and velocity of the fold of the oscillation that is born at the first loss.
-    fold: Option<(f64, f64, f64)>,
+pub struct Tongues {
+    /// Number of the frequency, and whether it is inverted rest that changes.
+    index: Array<i32>,
+    inverted: Vec<bool>,
+    /// The amplitude, the Floquet multiplier, 1 or -1, and whether rest is stable right above.
+    p: Array<f64>,
+    multiplier: Array<f64>,
+    above: Vec<bool>,
+    /// Whether hanging rest, and inverted rest, is stable below the first of them, at each frequency.
+    first: Vec<(bool, bool)>,
+    /// Whether upright is a rest.
+    upright: bool,
+    /// The curves over `p` and the frequency; none at one frequency, or of a rest without them.
+    curves: Option<Py<BifurcationSet>>,
 }
 
-#[pymethods]
-impl CriticalAmplitudes {
-    /// The result for a pendulum without such a rest: empty.
-    #[staticmethod]
-    fn no_rest() -> Self {
-        Self { stable: vec![false], ..Self::default() }
-    }
-}
-
-/// Critical amplitudes of the drive at each frequency, up to `p_max`, of hanging or `inverted` rest.
+/// Critical amplitudes of the drive at each frequency, up to `p_max`, of hanging and inverted rest.
 #[pyfunction]
-#[pyo3(signature = (model, inverted, omegas, p_max, folds, threads, progress=None))]
-#[allow(clippy::too_many_arguments)] // what Python passes, and the interpreter
+#[pyo3(signature = (model, omegas, p_max, threads, progress=None))]
 pub fn tongues(
     py: Python<'_>,
     model: Model,
-    inverted: bool,
     omegas: Vec<f64>,
     p_max: f64,
-    folds: bool,
     threads: usize,
     progress: Option<Py<PyAny>>,
-) -> PyResult<Vec<CriticalAmplitudes>> {
+) -> PyResult<Tongues> {
     let pendulum = model.pendulum()?;
-    let balance = if inverted { Balance::Inverted } else { Balance::Hanging };
     let found = interruptible(py, progress.as_ref(), |control| {
-        match search(&pendulum, balance, &omegas, p_max, folds, threads, control) {
-            Err(Error::NoRest { .. }) if inverted => Ok(None),
-            found => found.map(Some),
-        }
+        search(&pendulum, &omegas, p_max, threads, control)
     })?;
-    let Some(curves) = found else {
-        return Ok(omegas.iter().map(|_| CriticalAmplitudes::no_rest()).collect());
-    };
-    let moved = pendulum.torque != 0.0;
-    let amplitudes = curves.into_iter().map(|curve| {
-        let column =
-            |value: fn(&Critical) -> f64| curve.critical.iter().map(value).collect::<Vec<f64>>();
-        let above = curve.critical.iter().map(|c| c.stable[1]);
-        CriticalAmplitudes {
-            rest: true,
-            p: column(|c| c.p),
-            multiplier: column(|c| c.multiplier),
-            stable: std::iter::once(curve.stable_at_first).chain(above).collect(),
-            moved,
-            fold: curve.fold.map(|f| (f.p, f.point[0], f.point[1])),
+    let mut all = Vec::new();
+    for (index, rows) in found.rows.iter().enumerate() {
+        for (inverted, row) in [false, true].into_iter().zip(rows) {
+            all.extend(row.critical.iter().map(|critical| (index as i32, inverted, *critical)));
         }
-    });
-    Ok(amplitudes.collect())
+    }
+    let set = found.plane.map(|plane| Py::new(py, BifurcationSet::new(py, &plane, &[])?));
+    Ok(Tongues {
+        index: array(py, all.iter().map(|one| one.0).collect()),
+        inverted: all.iter().map(|one| one.1).collect(),
+        p: array(py, all.iter().map(|one| one.2.p).collect()),
+        multiplier: array(py, all.iter().map(|one| one.2.multiplier).collect()),
+        above: all.iter().map(|one| one.2.stable[1]).collect(),
+        first: found.rows.iter().map(|[a, b]| (a.stable_at_first, b.stable_at_first)).collect(),
+        upright: found.inverted,
+        curves: set.transpose()?,
+    })
 }

@@ -13,12 +13,12 @@ use pendmap::integrate::reference::event::EventKind;
 use pendmap::integrate::trajectory::{Request as Trajectory, simulate};
 use pendmap::maps::branches::{Branches, Request, branches};
 use pendmap::maps::control::Control;
-use pendmap::maps::tongues::{Balance, tongues};
 use pendmap::model::{Effect, Formula, Kind, Parameter, Pendulum};
 use pendmap::orbit::PoincareMap;
 use pendmap::orbit::newton::find;
 
 use crate::effects_as_formulas::formula;
+use crate::hill;
 use crate::support::driven;
 
 /// All branches of `n:w` in a range of `p`.
@@ -103,16 +103,7 @@ fn symmetric_oscillations_break_once_and_fold_once() {
     let cycles = found.family.cycles(branch.of);
     let ends = [&branch.run.orbits[0], &branch.run.orbits[branch.run.orbits.len() - 1]];
     let onset = ends.into_iter().zip(branch.ends).find(|(_, end)| *end == End::Rest).expect("one");
-    let level = tongues(
-        &driven(0.1, 1.0, 1.8),
-        Balance::Hanging,
-        &[1.8],
-        0.8,
-        false,
-        1,
-        &Control::default(),
-    );
-    let critical = level.expect("rest")[0].critical[0].p;
+    let (critical, _) = hill::critical(0.1, 1.8, 1.0, 0.8)[0];
     assert_near(&[cycles.at(&onset.0.place)], &[critical], 1e-9);
 }
 
@@ -212,11 +203,8 @@ fn doublings_accumulate_by_feigenbaums_ratio() {
 fn branches_of_rest_change_where_floquets_theory_says() {
     let base = driven(0.1, 1.0, 2.0);
     let found = along_p(&base, [0.05, 6.0], (1, 0), 1);
-    for (balance, centre) in
-        [(Balance::Hanging, 0.0_f64), (Balance::Inverted, std::f64::consts::PI)]
-    {
-        let level = tongues(&base, balance, &[2.0], 6.0, false, 1, &Control::default());
-        let critical: Vec<f64> = level.expect("rest")[0].critical.iter().map(|c| c.p).collect();
+    for (side, centre) in [(1.0, 0.0_f64), (-1.0, std::f64::consts::PI)] {
+        let critical: Vec<f64> = hill::critical(0.1, 2.0, side, 6.0).iter().map(|c| c.0).collect();
         let own = found.family.branches.iter().find(|branch| {
             branch.of.closure == Closure::Rest && (branch.of.centre.abs() - centre).abs() < 1.0
         });

@@ -16,7 +16,7 @@
 //! - [`maps`], [`continued_plans`], [`finite_time`], [`uncertainty`], [`threads`]: whole planes; [`planes`]: of parameters
 //! - [`continuation`]: branches of orbits along a parameter
 //! - [`exponents`]: rates of divergence of neighbouring motions, also through friction
-//! - [`tongues`]: regions of stability of rest
+//! - [`tongues`]: regions of stability of rest; [`hill`]: their bounds by Hill's determinant
 //! - [`properties`]: properties of every pendulum
 //! - [`input`]: refused input and its messages
 
@@ -28,6 +28,7 @@ mod continuation;
 mod continued_plans;
 mod convergence_order;
 mod corners;
+mod curves;
 mod edge_cases;
 mod effects;
 mod effects_as_formulas;
@@ -45,6 +46,7 @@ mod fit_step_scale;
 mod formulas;
 mod free_decay;
 mod friction;
+mod hill;
 mod input;
 mod kinks;
 mod lanes;

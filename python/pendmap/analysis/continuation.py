@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from pendmap import _core
-from pendmap.analysis import backbone, result, varied
+from pendmap.analysis import backbone, curves, result, varied
 from pendmap.analysis.result import Field, Schema, point, rows
 from pendmap.analysis.run import Numerics, RunOptions
 from pendmap.errors import (
@@ -40,11 +40,12 @@ if TYPE_CHECKING:
 LONGEST: Final = 64  # Longest period of an orbit, in forcing periods
 _PLACES: Final = 33  # Values along a range, from which the core knows how parameters depend on it
 _LISTED: Final = 16  # Largest number of events in a summary
-_CRITICALITY: Final = {-1: "no meaning", 0: "subcritical", 1: "supercritical"}
 
 
 def _events(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the events for the JSON object."""
+    if "event_kind" not in dataset:
+        return []
     names = ("kind", "value", "theta", "velocity", "n", "w", "multipliers", "supercritical")
     more = ("branch", "smooth")
     entries = result.records(dataset, **{name: f"event_{name}" for name in (*names, *more)})
@@ -57,6 +58,8 @@ def _events(dataset: xr.Dataset) -> list[dict[str, Any]]:
 
 def _branches(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the branches for the JSON object."""
+    if "branch_n" not in dataset:
+        return []
     names = ("n", "w", "symmetric", "begin", "end", "first", "last", "low", "high", "twin")
     entries = result.records(dataset, **{name: f"branch_{name}" for name in names})
     for entry in entries:
@@ -73,12 +76,15 @@ SCHEMA = Schema(
     Field("varied", "", "parameter that varies"),
     Field("events", "", "folds, doublings and other events of the branches", read=_events),
     Field("branches", "", "branches of orbits", read=_branches),
+    Field("curves", "", "curves in the plane of two parameters", read=curves.entries),
+    Field("points", "", "points of codimension 2 on them", read=curves.points),
+    Field("up_to", "periods", "longest period of the orbits of curves"),
     Field("n", "periods", "smallest period of the orbits searched"),
     Field("w", "turns", "net turns over it"),
     Field("longest", "periods", "longest period of branches begun at doublings"),
     Field("start", "", "angle and velocity where one branch was begun", None, json=False),
-    Field("low", "", "lower end of the range"),
-    Field("high", "", "upper end of the range"),
+    Field("low", "", "lower end of the range, or of both"),
+    Field("high", "", "upper end of the range, or of both"),
     *(field.hidden for field in varied.DRIVE),
     *result.TIMED,
     *result.END,
@@ -95,10 +101,11 @@ def continuation(  # noqa: PLR0913 (physics first, numerical choices by name)
     *,
     start: tuple[float, float] | None = None,
     longest: int = 32,
+    up_to: int = 4,
     run: RunOptions | None = None,
     **options: Unpack[Keywords],
 ) -> xr.Dataset:
-    """Follow periodic orbits along one parameter: branches, and what happens on them.
+    """Follow periodic orbits along a parameter: branches, and what happens on them; or two.
 
     An orbit is a zero of ``P(x_i) - x_(i+1)`` over its points, ``P`` the stroboscopic map. Branches
     are followed by pseudo-arclength, around folds and where orbits are unstable. Orbits are
@@ -108,13 +115,18 @@ def continuation(  # noqa: PLR0913 (physics first, numerical choices by name)
     there are followed too, both twins of a symmetry breaking. Under dry friction so are the values
     at which a turn becomes a stick, the velocity touches 0, or friction holds the orbit for ever.
 
+    With two parameters: curves of folds, period doublings and symmetry breakings in their plane, of
+    all orbits up to some period and of both rests, from sections in both directions until several
+    in a row have no event off the curves. Points of codimension 2 are located: cusps, and where a
+    doubling or a symmetry breaking changes between super- and subcritical.
+
     Parameters
     ----------
     pendulum : Pendulum or Rig
         The model; the parameter that varies replaces its own.
     ranges : mapping of str to (float, float) or array_like
-        One parameter and the ends of its range; several with arrays are a curve. Names are those
-        of :func:`pendmap.parameter_map`.
+        One parameter, or two, and the ends of their ranges; several with arrays are a curve. Names
+        are those of :func:`pendmap.parameter_map`.
     n : int
         Smallest period of the orbits, in forcing periods; 1 to 64.
     w : int
@@ -124,6 +136,8 @@ def continuation(  # noqa: PLR0913 (physics first, numerical choices by name)
         model's own value of the parameter; by default all orbits are searched.
     longest : int
         Longest period of the branches that are begun at doublings, in forcing periods.
+    up_to : int
+        With two parameters, the longest period of the orbits, in forcing periods; 1 to 16.
     run : RunOptions, optional
         As for :func:`pendmap.basins`.
 
@@ -143,6 +157,12 @@ def continuation(  # noqa: PLR0913 (physics first, numerical choices by name)
         ``event_n``, ``event_w``, ``event_multipliers``, ``event_supercritical``, ``event_smooth``,
         ``event_branch``, ``event_orbit``. Sections searched over ``section``.
 
+        Of two parameters, curves over ``curve``: ``curve_kind``, ``curve_n``, ``curve_w``,
+        ``curve_symmetric``, ``curve_begin``, ``curve_end``; their points over ``place``:
+        ``place_curve``, ``place_theta``, ``place_velocity``, ``place_multipliers``,
+        ``place_supercritical``, and ``place_p`` and others of the parameters; points of
+        codimension 2 over ``degenerate``: ``degenerate_kind``, ``degenerate_n`` and so on.
+
     Raises
     ------
     InputError
@@ -161,6 +181,16 @@ def continuation(  # noqa: PLR0913 (physics first, numerical choices by name)
     >>> result.event_kind.values.tolist(), result.event_value.values.round(9)
     (['period_doubling', 'fold'], array([1.34685852, 0.41678757]))
     """
+    if isinstance(ranges, Mapping) and len(ranges) == 2 and _are_axes(ranges):  # noqa: PLR2004
+        pendulum = varied.having(pendulum, ranges)
+        pairs = {k: (*x[:2], _PLACES) if isinstance(x, tuple) else x for k, x in ranges.items()}
+        axes = varied.varied(pendulum, pairs, 2)
+        numerics = Numerics(RunOptions.of(run, options).in_memory("continuation"))
+        dataset, request = curves.in_plane(pendulum, axes, up_to, numerics)
+        known = numerics.provenance() | request
+        say, what = curves.summary, "curves are"
+        varied.complete(SCHEMA, dataset, pendulum, axes, known, summary=say, what=what)
+        return dataset
     ranges = _with_count(ranges)
     pendulum = varied.having(pendulum, ranges)
     (axis,) = varied.varied(pendulum, ranges, 1)
@@ -184,6 +214,11 @@ def continuation(  # noqa: PLR0913 (physics first, numerical choices by name)
     what = "orbits are"
     varied.complete(SCHEMA, dataset, pendulum, (axis,), values, summary=_summary, what=what)
     return dataset
+
+
+def _are_axes(ranges: Mapping[str, ArrayLike]) -> bool:
+    """Return whether each of the ranges is an axis: not those of one curve."""
+    return all(isinstance(values, tuple | Mapping) for values in ranges.values())
 
 
 def _with_count(ranges: Mapping[str, ArrayLike]) -> Mapping[str, ArrayLike]:
@@ -273,7 +308,7 @@ def _dataset(raw: _core.Continuation, axis: Varied, units: Units) -> xr.Dataset:
         "event_w": variable("event", raw.w[owner[place]], "turns", "net turns over it"),
         "event_multipliers": variable(("event", *pair), multipliers[place], "1", multiplier),
         "event_supercritical": flag(
-            "event", raw.supercritical, "whether new orbits live beyond it", _CRITICALITY
+            "event", raw.supercritical, "whether new orbits live beyond it", curves.CRITICALITY
         ),
         "event_smooth": flag("event", raw.smooth, "whether the map is smooth there"),
         "event_branch": variable("event", owner[place], "1", "number of the branch"),

@@ -11,12 +11,12 @@ import numpy as np
 import xarray as xr
 
 from pendmap.analysis import cell_search, result, varied
+from pendmap.analysis.curves import in_plane
 from pendmap.analysis.draws import drawn, drawn_field, outcome_lines, outcomes
 from pendmap.analysis.orbit_table import attractors_of
 from pendmap.analysis.result import Field, Schema, rows
 from pendmap.analysis.run import Numerics, RunOptions
-from pendmap.analysis.tongues import tongues
-from pendmap.errors import InputError, check_flag
+from pendmap.errors import check_flag
 from pendmap.files import facts
 from pendmap.files.variables import flag, variable
 from pendmap.formatting import counted, span
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 
 _LISTED = 10  # Largest number of regimes in a summary
-_FREQUENCIES = 201  # Number of frequencies of the critical curves over a map, besides turns
+_LONGEST = 2  # Longest period of the orbits whose curves are drawn over a map
 
 
 def _regimes(dataset: xr.Dataset) -> list[dict[str, Any]]:
@@ -135,8 +135,8 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
         Periods before the four windows of trajectories not captured; by default those in which
         damping shrinks a free motion by exp(-40), at least 64.
     curves : bool
-        Whether to add the critical curves of rest (:func:`pendmap.tongues`), over ``p`` and
-        ``omega`` (or ``Omega``): figures draw them over the map.
+        Whether to add the curves of folds, period doublings and symmetry breakings of orbits up to
+        two periods, those of :func:`pendmap.continuation`: figures draw them over the map.
     draws : int, optional
         As for :func:`pendmap.basins`; adds the probability of each regime in each cell.
     run : RunOptions, optional
@@ -179,7 +179,9 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     several = None if draws is None else drawn(pendulum, draws, run)
     over: dict[str, Any] = {}
     if curves and several is None:
-        over, run = _curves(pendulum, columns, rows, run.part(0, 2)), run.part(1, 2)
+        numerics, run = Numerics(run.part(0, 2)), run.part(1, 2)
+        plane = in_plane(pendulum, axes, _LONGEST, numerics)[0]
+        over = {str(name): one.variable for name, one in plane.data_vars.items()}
     search = cell_search.CellSearch(pendulum, axes, starts, box, Numerics(run, tol, max_periods))
     if several is not None:
         same = partial(parameter_map, ranges=ranges, starts=starts, box=search.box)
@@ -248,34 +250,6 @@ def _dataset(raw: _core.ParameterMap, columns: Varied, rows: Varied, units: Unit
         },
         coords={**columns.coordinates, **rows.coordinates},
     )
-
-
-def _curves(
-    model: Pendulum | Rig, columns: Varied, rows: Varied, run: RunOptions
-) -> dict[str, Any]:
-    """Return the critical curves between the ends of the axes."""
-    by_name = {axis.name.lower(): axis for axis in (columns, rows)}
-    if set(by_name) != {"p", "omega"}:
-        raise InputError(f"curves must be over p and omega, got {columns.name} and {rows.name}")
-    omega, p = by_name["omega"], by_name["p"]
-    if omega.values.size == 1 or p.bare[-1] <= 0:
-        raise InputError("curves must have ranges of omega and of p above 0")
-    # Cells extend half a spacing beyond their centres: curves go to the edges of the figure.
-    half = np.diff(omega.bare)[0] / 2
-    low, high = omega.bare[0] - half, omega.bare[-1] + half
-    p_max = float(p.bare[-1] + (np.diff(p.bare)[0] / 2 if p.bare.size > 1 else 0.0))
-    frequency = np.linspace(max(low, omega.bare[0] / 2), high, _FREQUENCIES)
-    curves = tongues(model, frequency, p_max, inverted=False, refine=True, run=run)
-    scaled = omega.values[-1] / omega.bare[-1] * curves["omega"].values
-    along, at = "curve_frequency", "curve_point"
-    return {
-        "curve_omega": (along, scaled, omega.attributes),
-        "curve_fold": (along, curves["fold"].values, p.attributes),
-        "curve_fold_sought": (along, curves["asked"].values, curves["asked"].attrs),
-        "curve_index": (at, curves["index"].values, curves["index"].attrs),
-        "curve_p": (at, curves["p"].values, p.attributes),
-        "curve_multiplier": (at, curves["multiplier"].values, curves["multiplier"].attrs),
-    }
 
 
 def _summary(dataset: xr.Dataset) -> list[str]:

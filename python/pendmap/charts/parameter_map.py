@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import operator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -13,11 +13,11 @@ from pendmap._core import Attractor
 from pendmap.analysis.cell_search import UNDECIDED
 from pendmap.analysis.orbit_table import attractors_of
 from pendmap.analysis.parameter_map import sets
-from pendmap.charts import names, palette, plane, tongues
+from pendmap.charts import names, palette, plane
+from pendmap.charts.continuation import bifurcation_set
 from pendmap.charts.legend import colours_of
-from pendmap.charts.marks import Colours, Image, Line, Mark, together
+from pendmap.charts.marks import Colours, Image, Mark
 from pendmap.files import facts
-from pendmap.formatting import typographic
 from pendmap.units import Units
 
 if TYPE_CHECKING:
@@ -123,7 +123,9 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
     leading = ("kinds", "certainty" if "certainty" in dataset else "exponent")
     others = [one for one in _RECORDED if one in known and one not in leading]
     varied = str(dataset.attrs["columns"]), str(dataset.attrs["rows"])
-    lines = _curves(dataset)
+    kinds_of_curves = ("symmetry_breaking", "fold", "period_doubling")
+    shades = dict(zip(kinds_of_curves, palette.CURVES, strict=True))
+    lines = bifurcation_set(dataset, varied, shades, halo="#ffffff", order=2.0)
 
     def make(name: str, across: Ends, up: Ends) -> tuple[str, list[Mark]]:
         title = LAYERS.get(name, name)
@@ -176,30 +178,3 @@ def _colours(dataset: xr.Dataset, name: str, values: Floats) -> Colours:
     if name in ("attractors", "winding"):
         return names.counts(text, values)
     return Colours(text, "cividis", 0.0, 1.0)
-
-
-def _curves(dataset: xr.Dataset) -> list[Mark]:
-    """Return the critical curves of a map; an empty list if it has none."""
-    if "curve_p" not in dataset:
-        return []
-    omega = dataset["curve_omega"].values
-    at, p, multiplier = (dataset[f"curve_{one}"].values for one in ("index", "p", "multiplier"))
-    plus, minus = (
-        tongues.joined(omega, omega[at[multiplier == m]], p[multiplier == m]) for m in (1, -1)
-    )
-    sought = dataset["curve_fold_sought"].values > 0
-    fold = np.stack([omega, dataset["curve_fold"].values], axis=1)[sought]
-    turned = str(dataset.attrs["rows"]).lower() == "omega"
-    curves = (
-        ("rest: multiplier +1", "-", plus),
-        (typographic("rest: multiplier -1"), "--", minus),
-        ("fold of the oscillation born there", ":", [fold]),
-    )
-    marks: list[Mark] = []
-    for k, (name, dash, lines) in enumerate(curves):
-        x, y = together(line[:, ::-1] if turned else line for line in lines)
-        if np.isfinite(x + y).sum() > 1:
-            look: dict[str, Any] = {"name": name, "dash": dash, "path": f"curves/{k}"}
-            look["colour"] = palette.CURVES[k]
-            marks.append(Line(x, y, width=1.1, halo="#ffffff", order=2.0, **look))
-    return marks

@@ -107,7 +107,7 @@ def ready(dataset: xr.Dataset, action: str = "draw") -> xr.Dataset:
         dataset = dataset.isel(period=(at >= first - slack) & (at <= last + slack))
     if kind == "basins" and dataset["label"].size != int(dataset.attrs["cells"]):
         dataset = _recounted(dataset)
-    before, after = ("kind", "curve", "attractor", "orbit"), ("eigenvalue", "part", "trajectory")
+    before, after = ("kind", "formula", "attractor", "orbit"), ("eigenvalue", "part", "trajectory")
     return dataset.transpose(*before, *axes, *after, ..., missing_dims="ignore")
 
 

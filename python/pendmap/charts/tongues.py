@@ -1,46 +1,39 @@
-"""Critical curves: lines joined from frequency to frequency, and regions of stable rest."""
+"""Critical curves in the plane of the drive, and regions of stable rest."""
 
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
-from pendmap.analysis.tongues import NEAR, in_plane, window
 from pendmap.charts import names
 from pendmap.charts.chart import Axis, Chart, Panel
-from pendmap.charts.marks import QUIET, Areas, Line, Mark, Points, Text, this_pendulum, together
+from pendmap.charts.continuation import bifurcation_set
+from pendmap.charts.marks import Areas, Line, Mark, Points, Text, this_pendulum
 from pendmap.files import facts
 from pendmap.formatting import typographic
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Sequence
 
     import xarray as xr
 
     from pendmap.charts.marks import Floats
 
-    Point = tuple[float, float]
-
-_CURVES: Final = {
-    -1: ("minus", typographic("exact, multiplier -1 (period 2)"), "#0072b2", "#56b4e9"),
-    1: ("plus", "exact, multiplier +1 (period 1)", "#d55e00", "#e69f00"),
+_COLOURS: Final = {
+    "symmetry_breaking": "#d55e00",
+    "fold": "#009e73",
+    "period_doubling": "#0072b2",
 }
-"""Path, name and colours of the curves of hanging and inverted rest, by multiplier; +1 has
-solutions of the drive's period, -1 of twice that."""
-_STABLE, _INVERTED, _FOLD = "#e3ecd8", "#9a6fb0", "#009e73"
+_STABLE, _INVERTED = "#e3ecd8", "#9a6fb0"
 _DRIVE: Final = {"p", "omega", "phase", "Omega", "phi"}  # Parameters that vary
-
 _PLANES: Final = {
     "omega-p": ("tongues", "ω = Ω/w0", "p = YΩ²/g"),
     "e-alpha2": ("paper", "α² = 1/ω²", "e = p/ω² = Y/l"),
 }
 """Path in a recording, and names of the axes, of each plane."""
-_PARTED = 0.3  # Error above which an asymptotic curve is not drawn
-_JUMP = 0.6  # Largest change of p along a line from point to point, over the mean p plus 0.3
-_FAR: Final = 1e6  # Cost of joining points that lie on different curves
+_HIGHEST: Final = 2.6  # Largest ``e`` of a figure, if it was computed
 
 
 def chart(
@@ -53,9 +46,7 @@ def chart(
 ) -> Chart:
     """Return the critical curves in both planes; a figure shows one of them."""
     del cells
-    first = str(dataset.attrs.get("plane"))
-    order = sorted(_PLANES, key=lambda plane: plane != first)
-    panels = [_panel(dataset, plane, marks) for plane in order]
+    panels = [_panel(dataset, plane, marks) for plane in _PLANES]
     return Chart(
         title,
         names.parameters({k: v for k, v in facts(dataset).items() if k not in _DRIVE}),
@@ -68,131 +59,62 @@ def chart(
 
 def _panel(dataset: xr.Dataset, plane: str, marks: Sequence[tuple[float, float, str]]) -> Panel:
     omega, attrs = dataset["omega"].values, facts(dataset)
-    p_max = float(attrs["p_max"])
-    x, top = window(omega, p_max, plane)
+    low, high, p_max = float(omega[0]), float(omega[-1]), float(attrs["p_max"])
+    x, top = (low, high) if low < high else (0.95 * low, 1.05 * high), p_max
+    if plane != "omega-p":
+        x, top = (0.0, 1 / low**2), min(_HIGHEST, p_max / low**2)
 
     def to(points: Floats) -> Floats:
         """Return points (omega, p) in the coordinates of the plane."""
-        return np.stack(in_plane(points[..., 0], points[..., 1], plane), axis=-1)
-
-    def curve(lines: Iterable[Floats], **look: Any) -> Line:  # noqa: ANN401 (fields of a line)
-        return Line(*together(map(to, lines)), **look)
-
-    def critical(prefix: str, which: int) -> list[Floats]:
-        return joined(omega, *_points(dataset, prefix, which))
+        if plane == "omega-p":
+            return points
+        return np.stack([1 / points[..., 0] ** 2, points[..., 1] / points[..., 0] ** 2], axis=-1)
 
     rest = "rest: its orbit is stable" if attrs["moved"] else "rest is stable"
-    hanging, inverted = ([to(area) for area in _stable(dataset, one)] for one in ("", "inverted_"))
+    hanging, inverted = ([to(one) for one in _stable(dataset, up)] for up in (False, True))
     drawn: list[Mark] = [Areas(hanging, colour=_STABLE, name=f"hanging {rest}")]
     if inverted:
-        # A hatch leaves the area below it visible, and has no seams.
         name = f"inverted {rest}"
         drawn.append(Areas(inverted, colour=_INVERTED, hatch="////", name=name))
-    for m, (name, text, colour, pale) in _CURVES.items():
-        look: dict[str, Any] = {"width": 1.5 if m < 0 else 1.1, "order": 2.2}
-        drawn.append(curve(critical("", m), colour=colour, name=text, path=name, **look))
-        lines = critical("inverted_", m)
-        look["name"] = f"inverted rest: {text.partition(' (')[0]}" if lines else ""
-        drawn.append(curve(lines, colour=pale, path=f"inverted_{name}", **look))
-    lines = [line for m in _CURVES for line in critical("undamped_", m)]
-    text = "exact, without damping" if float(attrs["gamma"]) > 0 and lines else ""
-    drawn.append(curve(lines, colour=QUIET, width=0.6, name=text, path="undamped"))
-    fold = np.stack([omega, dataset["fold"].values], axis=-1)[dataset["asked"].values > 0]
-    text = "fold: the oscillation exists from here" if np.isfinite(to(fold)).any() else ""
-    look = {"colour": _FOLD, "width": 1.6, "dash": (5.0, 2.0), "order": 2.1}
-    drawn.append(Line(*to(fold).T, name=text, path="fold", **look))
-    drawn += _asymptotic(dataset, to)
-    edge = to(np.stack([omega, np.full_like(omega, p_max)], axis=-1))
-    if (edge[:, 1] < 0.995 * top).any():
-        drawn.append(Line(*edge.T, colour="#c8c8c8", width=3.0, name="largest p computed", order=1))
+    if "curve_kind" in dataset:
+        drawn += bifurcation_set(dataset, ("omega", "p"), _COLOURS, to, order=2.1)
+    else:
+        at = np.stack([dataset[f"critical_{one}"].values for one in ("omega", "p")], axis=-1)
+        multiplier = dataset["critical_multiplier"].values
+        for m, kind in ((-1, "period_doubling"), (1, "symmetry_breaking")):
+            text, shown = typographic(f"multiplier {m:+}"), to(at[multiplier == m])
+            drawn.append(Points(*shown.T, colour=_COLOURS[kind], size=2.0, name=text))
+    for k, look in enumerate(("-.", ":")):
+        line = to(np.stack([omega, dataset["asymptotic"].values[k]], axis=-1))
+        text = str(dataset["formula"].values[k]) if np.isfinite(line).any() else ""
+        drawn.append(Line(*line.T, dash=look, width=1.0, name=text))
     if not marks:
-        at, up = map(float, to(np.array([float(attrs["own_omega"]), float(attrs["own_p"])])))
-        drawn.append(this_pendulum(at, up, named=x[0] <= at <= x[1] and 0 <= up <= top))
-    for p, at, name in marks:
-        spot = to(np.array([at, p]))
+        own = to(np.array([float(attrs["own_omega"]), float(attrs["own_p"])]))
+        across, high = map(float, own)
+        drawn.append(this_pendulum(across, high, named=x[0] <= across <= x[1] and high <= top))
+    for p, frequency, name in marks:
+        spot = to(np.array([frequency, p]))
         drawn.append(Points(*spot[:, None], size=5.0))
         aside, up = spot[0] + 0.015 * (x[1] - x[0]), spot[1] + 0.012 * top
         drawn.append(Text(aside, up, name, align=("left", "bottom")))
-    root, across, along = _PLANES[plane]
-    return Panel(plane, "", Axis(across, x), Axis(along, (0.0, top)), drawn, root=root)
+    root, *sides = _PLANES[plane]
+    return Panel(plane, "", Axis(sides[0], x), Axis(sides[1], (0.0, top)), drawn, root=root)
 
 
-def _asymptotic(dataset: xr.Dataset, to: Callable[[Floats], Floats]) -> list[Mark]:
-    """Return the asymptotic curves, thin where they differ from the exact ones."""
-    omega, error = dataset["omega"].values, dataset["asymptotic_error"].values
-    drawn: list[Mark] = []
-    for k, (name, look) in enumerate(zip(dataset["curve"].values, ("-.", "--", ":"), strict=False)):
-        whole = to(np.stack([omega, dataset["asymptotic"].values[k]], axis=-1))
-        close = (error[k] < NEAR)[:, None]
-        parting = np.where((error[k] < _PARTED)[:, None] & ~close, whole, np.nan)
-        text = "" if np.isnan(parting).all() else str(name)
-        near = np.where(close, whole, np.nan)
-        drawn += [
-            Line(*near.T, dash=look, width=1.0, name=text),
-            Line(*parting.T, dash=look, width=0.5, alpha=0.45),
-        ]
-    return drawn
-
-
-def joined(omega: Floats, at: Floats, p: Floats) -> list[Floats]:
-    """Return lines, each (n, 2), through critical amplitudes ``p`` at frequencies ``at``.
-
-    Points at successive frequencies are joined where they continue lines best. Where a curve turns
-    back between two frequencies, its neighbouring ends are joined.
-    """
-    done: list[list[Point]] = []
-    lines: list[list[Point]] = []
-    for w in omega:
-        values = np.sort(p[at == w])
-        ends = np.array([line[-1][1] for line in lines])
-        away = np.abs(np.array([_ahead(line, w) for line in lines])[:, None] - values)
-        far = np.abs(ends[:, None] - values) >= _reach(ends[:, None], values)
-        pairs = linear_sum_assignment(np.where(far, _FAR, away))
-        following = {int(i): int(j) for i, j in zip(*pairs, strict=True) if not far[i, j]}
-        for i, j in following.items():
-            lines[i].append((w, values[j]))
-        new = [[(w, v)] for j, v in enumerate(values) if j not in following.values()]
-        ended = [line for i, line in enumerate(lines) if i not in following]
-        done += ended + _turns(sorted(line[-1] for line in ended))
-        done += _turns([line[0] for line in new]) if w > omega[0] else []
-        lines = [*(lines[i] for i in sorted(following)), *new]
-    return [np.array(line) for line in [*done, *lines] if len(line) > 1]
-
-
-def _reach(one: Any, other: Any) -> Any:  # noqa: ANN401 (numbers or arrays)
-    """Return the distance below which points at neighbouring frequencies lie on one curve."""
-    return _JUMP * (0.3 + (one + other) / 2)
-
-
-def _turns(ends: Sequence[Point]) -> list[list[Point]]:
-    """Return joints between neighbouring ends at one frequency, at which a curve turns back."""
-    pairs = list(itertools.pairwise(ends))
-    return [[a, b] for a, b in pairs if abs(a[1] - b[1]) < _reach(a[1], b[1])]
-
-
-def _ahead(line: list[Point], w: float) -> float:
-    """Return the extrapolation of a line to the next frequency."""
-    (w0, p0), (w1, p1) = line[-2:] if len(line) > 1 else (line[0], line[0])
-    return p1 + (p1 - p0) * (w - w1) / (w1 - w0) if w1 > w0 else p1
-
-
-def _stable(dataset: xr.Dataset, prefix: str) -> list[Floats]:
+def _stable(dataset: xr.Dataset, inverted: bool) -> list[Floats]:  # noqa: FBT001 (which rest)
     """Return quadrangles between neighbouring frequencies in which rest is stable."""
     omega, p_max = dataset["omega"].values, float(dataset.attrs["p_max"])
-    at, p = _points(dataset, prefix)
-    above = dataset[f"{prefix}stable_above"].values
-    first = np.zeros(omega.size) if prefix else dataset["stable_at_first"].values
-    intervals: list[list[Point]] = []
-    for w, stable in zip(omega, first, strict=True):
-        mine = at == w
-        edges = itertools.pairwise([0.0, *p[mine], p_max])
-        merged: list[Point] = []
-        for (low, high), yes in zip(edges, [stable, *above[mine]], strict=True):
-            if yes and merged and merged[-1][1] == low:
-                merged[-1] = (merged[-1][0], high)
-            elif yes and high > low:
-                merged.append((low, high))
-        intervals.append(merged)
+    mine = dataset["critical_inverted"].values == inverted
+    index, p, above = (
+        dataset[f"critical_{name}"].values[mine] for name in ("index", "p", "stable_above")
+    )
+    first = np.zeros(omega.size) if inverted else dataset["stable_at_first"].values
+    intervals = []
+    for k in range(omega.size):
+        edges = np.array([0.0, *p[index == k], p_max])
+        stable = np.array([0, first[k], *above[index == k], 0]) > 0
+        changes = np.flatnonzero(np.diff(stable))
+        intervals.append(edges[changes].reshape(-1, 2))
     areas = []
     for k, (here, there) in enumerate(itertools.pairwise(omega)):
         before, after = intervals[k], intervals[k + 1]
@@ -201,11 +123,3 @@ def _stable(dataset: xr.Dataset, prefix: str) -> list[Floats]:
             if same or min(a[1], b[1]) > max(a[0], b[0]):
                 areas.append(np.array([(here, a[0]), (here, a[1]), (there, b[1]), (there, b[0])]))
     return areas
-
-
-def _points(dataset: xr.Dataset, prefix: str, which: int = 0) -> tuple[Floats, Floats]:
-    """Return the critical points of a multiplier, or all: frequencies and amplitudes."""
-    multiplier = dataset[f"{prefix}multiplier"].values
-    at, p = dataset[f"{prefix or 'critical_'}omega"].values, dataset[f"{prefix}p"].values
-    mine = (multiplier == which) | (which == 0)
-    return at[mine], p[mine]

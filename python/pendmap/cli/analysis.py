@@ -139,10 +139,12 @@ _ENTRIES: Final = {
     "continue": Entry(
         """Follow periodic orbits along a parameter: branches, folds, doublings, and their ends.
 
-        One parameter is a range: --vary p 0.3:1.6, or --p 0.3:1.6.
+        One parameter is a range: --vary p 0.3:1.6, or --p 0.3:1.6. Two give the curves of folds,
+        doublings and symmetry breakings in their plane.
         """,
         (
             "pendmap continue --vary p 0.3:1.6 --n 1 --w 1",
+            "pendmap continue --vary p 0:2.5 --vary omega 1.5:3 --up-to 2",
             "pendmap continue --vary p 0.1:1 --n 2 --theta-r 0.05 --omega 1.8 --json",
         ),
         example="--n 1 --w 1",
@@ -171,15 +173,13 @@ _ENTRIES: Final = {
     "tongues": Entry(
         """Find where rest, hanging and inverted, is stable: critical curves of eq. 1.3, exact.
 
-        Also without damping; folds of the oscillation born there; curves by perturbation. For
-        files, frequencies are added where curves turn back; --json lists the requested ones.
+        Also folds of the oscillations born there, and curves by perturbation.
         """,
         (
             "pendmap tongues --omega 0.5:3:200 --p-max 6",
-            "pendmap tongues --gamma 0 --plane e-alpha2 --out mathieu.pdf",
+            "pendmap tongues --gamma 0 --omega 0.6:2:80 --out mathieu.pdf",
         ),
-        example="--p-max 6 --plane e-alpha2",
-        left_out=("inverted", "refine"),
+        example="--p-max 6",
         further=(
             option(
                 "--omega omegas",
@@ -280,7 +280,7 @@ def _arguments(
 
             given["live"] = viewer.Live(model, (given["theta"], given["velocity"]), given["live"])
     if name == "tongues":
-        given |= {"omega": given.pop("omegas"), "refine": bool(outputs.files)}
+        given["omega"] = given.pop("omegas")
     if name == "basins" and (outputs.path("plot") or outputs.path("rerun")):
         from pendmap import _core
         from pendmap.charts.basins import BYTES_OF_CELL

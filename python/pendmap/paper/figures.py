@@ -144,6 +144,7 @@ def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
     seed : int
         Draws the rig's noise.
     """
+    import pendmap  # noqa: PLC0415
     from pendmap import render  # noqa: PLC0415
     from pendmap.charts import comparison, identification, tongues  # noqa: PLC0415
     from pendmap.model import PRESETS  # noqa: PLC0415
@@ -156,7 +157,9 @@ def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
     title = f"{number}: {FIGURES[key][0].lower()}{FIGURES[key][1:]}"
     if key == "1":
         marks = [(one.p, one.omega, name[-1]) for name, one in sorted(PRESETS.items())]
-        return render.draw(tongues.chart(_critical(), title=title, marks=marks), path)
+        omega = 1 / np.sqrt(np.linspace(*_SQUARES, _COLUMNS)[::-1])
+        found = pendmap.tongues(PRESETS["fig2a"], omega, _HIGHEST / _SQUARES[0])
+        return render.draw(tongues.chart(found, layer="e-alpha2", title=title, marks=marks), path)
     if key == "2":
         return render.draw(tumbling_chart(tumbling(), title), path)
     if key == "3":
@@ -170,16 +173,6 @@ def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
     subtitle = f"{_RIG}, release at 3.0 rad, 100 Hz;   4096 counts, noise 0.1°, zero off by 0.05°"
     words = {"title": title, "subtitle": f"{subtitle}, seed {seed}"}
     return render.draw(identification.whole(report(seed), parts=(_PARTS[key],), **words), path)
-
-
-def _critical() -> xr.Dataset:
-    """Return the critical curves of figure 1: alpha^2 up to 1.6, e up to 2.6."""
-    from pendmap.analysis.tongues import tongues  # noqa: PLC0415
-    from pendmap.model import Pendulum  # noqa: PLC0415
-
-    omega = 1 / np.sqrt(np.linspace(*_SQUARES, _COLUMNS)[::-1])
-    p_max, plane = _HIGHEST / _SQUARES[0], "e-alpha2"
-    return tongues(Pendulum(gamma=0.1), omega, p_max, plane=plane, inverted=False, refine=True)
 
 
 def printed_table() -> tuple[list[str], list[list[str]]]:

@@ -105,10 +105,10 @@ def test_critical_amplitudes_are_where_the_growth_vanishes(
     gamma: float, omega: float, b: float, theta: float, p_max: float
 ) -> None:
     effects = (Effect("asymmetric_viscous", {"b": b}),)
-    prefix = "inverted_" if theta else ""
     found = pendmap.tongues(Pendulum(gamma, 0.5, omega, effects=effects), [omega], p_max)
-    (p,) = found[f"{prefix}p"].values
-    above = bool(found[f"{prefix}stable_above"].values[0])
+    mine = found.critical_inverted.values == (theta > 0)
+    (p,) = found.critical_p.values[mine]
+    above = bool(found.critical_stable_above.values[mine][0])
     sides = [
         expected(Pendulum(gamma, p * by, omega), b, theta, 60) < 0 for by in (1 - 1e-4, 1 + 1e-4)
     ]

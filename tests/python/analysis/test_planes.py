@@ -93,9 +93,8 @@ def test_the_figure_has_stripes_where_kinds_coexist(plane: xr.Dataset) -> None:
 
 
 @pytest.mark.usefixtures("strict_recordings")
-def test_curves_share_the_progress_and_do_not_leap_from_tongue_to_tongue(tmp_path: Path) -> None:
-    # The fold below the first tongue ends at omega = 1.26, that below the second begins at 0.97.
-    plane, seen = {"p": (0.1, 1.0, 3), "omega": (0.8, 2.2, 3)}, []
+def test_curves_share_the_progress_and_are_recorded(tmp_path: Path) -> None:
+    plane, seen = {"p": (0.1, 1.0, 3), "omega": (1.7, 2.2, 3)}, []
     found = pendmap.parameter_map(
         Pendulum(), plane, curves=True, progress=lambda *x: seen.append(x[0] / x[1])
     )
@@ -103,13 +102,17 @@ def test_curves_share_the_progress_and_do_not_leap_from_tongue_to_tongue(tmp_pat
     assert any(0 < share < 0.5 for share in seen)  # while curves are computed
     assert seen[-1] <= 1
     back = recorded(found, tmp_path)
-    columns = [back.columns[f"/kinds/data/curves/{k}"] for k in range(3)]
-    strips = [part for one in columns for part in one["LineStrips2D:strips"][0]]
-    assert len(strips) >= 4
-    for strip in strips:
-        assert np.abs(np.diff(np.asarray(strip), axis=0)).max() < 0.2
+    paths = [name for name in back.columns if name.startswith("/kinds/data/rest/period_doubling/")]
+    assert len(paths) == 2  # super- and subcritical
+    for path in paths:
+        for strip in back.columns[path]["LineStrips2D:strips"][0]:
+            assert np.abs(np.diff(np.asarray(strip), axis=0)).max() < 0.2
     legend = str(back.one("/legend", "TextDocument:text"))
-    assert "- rest: multiplier +1: magenta" in legend
+    assert "- period doubling: indigo" in legend
+    # The fold of the rotation and that of the oscillation bound their kinds.
+    folds = found["curve_kind"].values == "fold"
+    both = (found[name].values[folds].tolist() for name in ("curve_n", "curve_w"))
+    assert {(1, 1), (2, 0)} <= {*zip(*both, strict=True)}
 
 
 def test_friction_holds_rest_in_every_cell() -> None:

@@ -1,0 +1,93 @@
+//! The orbits of all periods up to one and with any turns, at once.
+//!
+//! As [`super::orbits`], from one grid a period: the displacement is compared with all multiples of a turn. What is found has
+//! the precision of lanes, enough to be followed from. Where motions part so fast that the grid does not resolve them,
+//! Newton's method starts from cells spread evenly.
+
+use std::f64::consts::{PI, TAU};
+
+use super::advance::advance;
+use super::control::Control;
+use super::multistart::{approach, places};
+use super::orbits::is_held;
+use super::starts::Axis;
+use crate::error::Error;
+use crate::integrate::{State, Strobe};
+use crate::lanes::InstructionSet;
+use crate::model::Pendulum;
+use crate::model::pendulum::{Route, Symmetry};
+use crate::orbit::PoincareMap;
+use crate::orbit::newton::{self, PeriodicOrbit};
+
+/// Lengths of steps for displacements and for orbits, in units of the fastest small oscillation: errors of 1e-6 and 1e-10 in a
+/// few periods.
+const STEPS: [f64; 2] = [0.2, 0.06];
+/// Cells along a turn, a period.
+const CELLS: usize = 60;
+/// Starts of Newton's method at most, a period.
+const MOST: usize = 4_000;
+/// Its largest distance from a start, in cells, and the least value of that distance.
+const REACH: f64 = 8.0;
+const LEAST_REACH: f64 = 0.3;
+/// A start this near to an orbit leads to it.
+const KNOWN: f64 = 1e-3;
+
+/// Orbits with smallest periods up to `longest`; of mirror images one, where the mirrored motion needs no time.
+///
+/// # Errors
+/// The errors of [`super::orbits::orbits`].
+pub fn every_orbit(
+    pendulum: &Pendulum,
+    longest: usize,
+    threads: usize,
+    control: &Control,
+) -> Result<Vec<PeriodicOrbit>, Error> {
+    let mirrored = pendulum.symmetry() == Some(Symmetry::AtOnce);
+    // A fall from the top under the largest acceleration, or a rotation by a turn a period.
+    let fall = 2.0 * (1.0 + pendulum.drive.p.abs()).sqrt();
+    let reach = fall.hypot(TAU / pendulum.period());
+    let sides = if mirrored { 1 } else { 2 };
+    let low = if mirrored { 0.0 } else { -reach };
+    let simd = InstructionSet::choose()?;
+    let grid = |n: usize| {
+        let count = CELLS * n;
+        let theta = Axis::new("theta", -PI, PI, count)?;
+        Ok::<_, Error>([theta, Axis::new("velocity", low, reach, count * sides / 2)?])
+    };
+    let duration = pendulum.period() * pendulum.greatest_pull().sqrt();
+    let [coarse, fine] =
+        STEPS.map(|step| Strobe::new(pendulum, (duration / step).ceil() as usize, simd));
+    let plain = pendulum.route() == Route::Smooth && !pendulum.has_extra_load();
+    let map = if plain { PoincareMap::of_steps(&fine) } else { PoincareMap::new(pendulum) };
+    let mut all: Vec<PeriodicOrbit> = Vec::new();
+    for n in 1..=longest {
+        // The displacement; on the circle without turns.
+        let displacement = |from: &[State], turning: bool| -> Result<Vec<State>, Error> {
+            let (ends, turns) = advance(&coarse, from, n, threads, control)?;
+            let gap = |(start, (end, turns)): (&State, (State, i64))| {
+                let rest = coarse.angle.wrapped(end[0] - start[0]);
+                [rest + if turning { turns as f64 * TAU } else { 0.0 }, end[1] - start[1]]
+            };
+            Ok(from.iter().zip(ends.iter().zip(turns)).map(gap).collect())
+        };
+        let axes = grid(n)?;
+        let places = places(axes, Some(TAU), MOST, |from| displacement(from, true))?;
+        let spread: Vec<State> = places.iter().step_by(places.len() / MOST + 1).copied().collect();
+        let cell = TAU / axes[0].count as f64;
+        let far = LEAST_REACH.max(REACH * cell);
+        let near = approach(&spread, far, |from| displacement(from, false))?;
+        let known = |state: &State| all.iter().any(|orbit| orbit.contains(*state, KNOWN));
+        let starts: Vec<(State, usize)> =
+            near.into_iter().filter(|state| !known(state)).map(|state| (state, n)).collect();
+        for orbit in newton::find_others(&map, &starts, LEAST_REACH, &[]) {
+            let image = orbit.mirrored().0;
+            let alike =
+                |other: &PeriodicOrbit| other.is_same(&orbit) || mirrored && other.is_same(&image);
+            if !is_held(pendulum, &orbit) && !all.iter().any(alike) {
+                all.push(orbit);
+            }
+        }
+        control.check()?;
+    }
+    Ok(all)
+}

@@ -1,0 +1,122 @@
+//! Bindings of the bifurcation set of a plane.
+
+use numpy::PyArray2;
+use pendmap::continuation::course::{Course, Law};
+use pendmap::continuation::critical::Critical;
+use pendmap::continuation::cycle::Closure;
+use pendmap::continuation::plane::Plane;
+use pendmap::error::Error;
+use pendmap::maps::curves::{Request, Section, curves as search};
+use pendmap::model::Parameter;
+use pyo3::prelude::*;
+
+use super::convert::{Array, array};
+use super::long_calls::interruptible;
+use super::model::Model;
+use super::raise;
+
+/// Parameters along an axis: places from 0 to 1, and the values of each there.
+type Axis = (Vec<f64>, Vec<(String, Vec<f64>)>);
+
+/// Curves as columns: of the curves, of their places, of the points of codimension 2.
+#[pyclass(frozen, get_all, module = "pendmap._core")]
+pub struct BifurcationSet {
+    /// Of each curve: what happens there, period, net turns, whether the orbits are their own mirror images, why it ends
+    /// on both sides, the point of codimension 2 that either end is at, -1 where there is none.
+    kind: Vec<&'static str>,
+    n: Array<i32>,
+    w: Array<i32>,
+    symmetric: Vec<bool>,
+    ends: Vec<(&'static str, &'static str)>,
+    meets: Vec<(i32, i32)>,
+    /// Of each place: its curve, both coordinates, angle and velocity of a point of the orbit, real and imaginary parts
+    /// of its multipliers, 1 where new orbits live beyond the loss of stability, 0 where before it, -1 where that has no meaning.
+    curve: Array<i32>,
+    at: Py<PyArray2<f64>>,
+    theta: Array<f64>,
+    velocity: Array<f64>,
+    multipliers: Py<PyArray2<f64>>,
+    supercritical: Array<i32>,
+    /// Of each point of codimension 2: what it is, and its place.
+    degenerate_kind: Vec<&'static str>,
+    degenerate_place: Array<i32>,
+    /// The coordinate held on each section, its value, orbits found there, new curves.
+    sections: Vec<(usize, f64, usize, usize)>,
+}
+
+/// Curves of folds, period doublings and symmetry breakings of orbits up to the period `longest` in the plane of two axes;
+/// `only` some periods and net turns.
+#[pyfunction]
+#[pyo3(signature = (model, axes, longest, only, threads, progress=None))]
+pub fn bifurcation_set(
+    py: Python<'_>,
+    model: Model,
+    axes: (Axis, Axis),
+    longest: usize,
+    only: Option<Vec<(usize, i64)>>,
+    threads: usize,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<BifurcationSet> {
+    let base = model.pendulum()?;
+    let axis = |(places, parameters): Axis| -> Result<Vec<(Parameter, Law)>, Error> {
+        let one = |(name, values): (String, Vec<f64>)| {
+            Ok((base.parameter(&name)?, Law::through(&places, &values)?))
+        };
+        parameters.into_iter().map(one).collect()
+    };
+    let axes = vec![axis(axes.0).map_err(raise)?, axis(axes.1).map_err(raise)?];
+    let course = Course::new(base, axes);
+    let request = Request { longest, only, threads };
+    let found = interruptible(py, progress.as_ref(), |control| search(&course, &request, control))?;
+    BifurcationSet::new(py, &found.plane, &found.sections)
+}
+
+impl BifurcationSet {
+    pub(super) fn new(py: Python<'_>, plane: &Plane, sections: &[Section]) -> PyResult<Self> {
+        let all = &plane.curves;
+        let angle = plane.course.base.angle();
+        let sign = |known: Option<bool>| known.map_or(-1, i32::from);
+        let (mut curve, mut at, mut multipliers, mut supercritical) =
+            (vec![], vec![], vec![], vec![]);
+        let (mut theta, mut velocity) = (vec![], vec![]);
+        let (mut degenerate_kind, mut degenerate_place) = (vec![], vec![]);
+        // Number of the first point of codimension 2 of each curve.
+        let mut first = Vec::new();
+        for (number, one) in all.iter().enumerate() {
+            first.push(degenerate_kind.len());
+            for (kind, index) in &one.degenerate {
+                degenerate_kind.push(kind.word());
+                degenerate_place.push((curve.len() + index) as i32);
+            }
+            let critical = plane.critical(one.of, one.kind);
+            for point in &one.points {
+                let [angle_there, speed] = critical.points(&point.orbit.place)[0];
+                theta.push(angle.wrapped(angle_there));
+                velocity.push(speed);
+                curve.push(number as i32);
+                at.push(Critical::at(&point.orbit.place).to_vec());
+                let pair = critical.cycles.multipliers(&point.orbit).0;
+                multipliers.push(pair.iter().flat_map(|m| [m.re, m.im]).collect::<Vec<f64>>());
+                supercritical.push(sign(critical.is_supercritical(point)));
+            }
+        }
+        let meets = |of: Option<(usize, usize)>| of.map_or(-1, |(c, k)| (first[c] + k) as i32);
+        Ok(Self {
+            kind: all.iter().map(|one| one.kind.word()).collect(),
+            n: array(py, all.iter().map(|one| one.of.n as i32).collect()),
+            w: array(py, all.iter().map(|one| one.of.w as i32).collect()),
+            symmetric: all.iter().map(|one| one.of.closure != Closure::Whole).collect(),
+            ends: all.iter().map(|one| (one.ends[0].words(), one.ends[1].words())).collect(),
+            meets: all.iter().map(|one| (meets(one.meets[0]), meets(one.meets[1]))).collect(),
+            curve: array(py, curve),
+            at: PyArray2::from_vec2(py, &at)?.unbind(),
+            theta: array(py, theta),
+            velocity: array(py, velocity),
+            multipliers: PyArray2::from_vec2(py, &multipliers)?.unbind(),
+            supercritical: array(py, supercritical),
+            degenerate_kind,
+            degenerate_place: array(py, degenerate_place),
+            sections: sections.iter().map(|s| (s.held.0, s.held.1, s.orbits, s.new)).collect(),
+        })
+    }
+}

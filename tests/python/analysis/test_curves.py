@@ -1,0 +1,62 @@
+"""Curves in the plane of two parameters."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+import pendmap
+from pendmap.analysis import continuation
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+PENDULUM = pendmap.Pendulum(gamma=0.1, omega=2.0)
+RANGES = {"p": (0.0, 1.6), "omega": (1.8, 2.2)}
+
+
+@pytest.fixture(scope="module")
+def plane() -> xr.Dataset:
+    return pendmap.continuation(PENDULUM, RANGES, up_to=1, threads=1)
+
+
+def test_curves_of_fixed_points_hold_known_folds_and_doublings(plane: xr.Dataset) -> None:
+    kinds = plane.curve_kind.values.tolist()
+    assert {"fold", "period_doubling"} <= set(kinds)
+    owner, p, omega = (plane[name].values for name in ("place_curve", "place_p", "place_omega"))
+    assert (p >= 0).all()
+    assert (p <= 1.6).all()
+    assert (omega >= 1.8).all()
+    assert (omega <= 2.2).all()
+    # The fold of rotation 1:1 at omega 2, between neighbours of its curve.
+    for number in np.flatnonzero(plane.curve_kind.values == "fold"):
+        mine = owner == number
+        order = np.argsort(omega[mine])
+        if abs(np.interp(2.0, omega[mine][order], p[mine][order]) - 0.416787572822) < 1e-3:
+            break
+    else:
+        pytest.fail("no curve of folds near the known one")
+
+
+def test_the_doubling_of_rest_changes_where_a_fold_begins(plane: xr.Dataset) -> None:
+    kinds = plane.degenerate_kind.values == "generalised_doubling"
+    at = [plane[f"degenerate_{name}"].values[kinds] for name in ("p", "omega")]
+    # By heyoka's variational equations of second order.
+    near = np.hypot(at[0] - 0.200032729604, at[1] - 1.993746585880) < 1e-8
+    assert near.any()
+
+
+def test_the_json_object_has_curves_and_points(plane: xr.Dataset) -> None:
+    answer = continuation.SCHEMA.json(plane)
+    assert len(answer["curves"]) == plane.sizes["curve"]
+    assert {"kind", "n", "w", "values", "ends"} <= set(answer["curves"][0])
+    assert set(answer["curves"][0]["values"]) == {"p", "omega"}
+    assert {"kind", "n", "w", "values"} <= set(answer["points"][0])
+    assert answer["branches"] == []
+
+
+def test_a_period_out_of_range_is_refused() -> None:
+    with pytest.raises(pendmap.InputError, match="up_to"):
+        pendmap.continuation(PENDULUM, RANGES, up_to=17)
