@@ -25,7 +25,7 @@ const TRACE: f64 = 0.3;
 const MOVED: f64 = 0.08;
 const MOST: f64 = 2.5;
 /// How much longer steps are where what is found is refined later.
-const EASE: f64 = 2.0;
+const EASE: f64 = 3.0;
 /// Length of a prediction by the last step, in units of it.
 const AHEAD: f64 = 2.5;
 /// Ratios of successive steps.

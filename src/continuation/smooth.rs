@@ -124,29 +124,29 @@ impl<const N: usize> Motions<'_, N> {
             times[part] = gathered(token, &steps.times[part * L::WIDTH..]);
             factors[part] = gathered(token, &steps.factors[part * L::WIDTH..]);
         }
-        let none = [0.0; MAX_WIDTH];
         let mut bundles: Vec<[Tangent<L, N>; 2]> = moving
             .chunks(L::WIDTH)
             .map(|chunk| {
                 [0, 1].map(|k| gathered(token, &chunk.iter().map(|one| one[k]).collect::<Vec<_>>()))
             })
             .collect();
-        let mut loads = ([none; 1], [[0.0; MAX_WIDTH]; N]);
+        // Value and slopes of the modulation at each stage of a step.
+        let (mut values, mut slopes) = ([0.0; MAX_WIDTH], [[0.0; MAX_WIDTH]; N]);
         for k in 0..steps.count {
             let mut modulation = [length; STAGES];
             let start = length.scale(k as f64);
             for part in 0..parts {
                 let vertical = equation.forcing(start + times[part]).vertical;
                 let load = -(factors[part] * vertical);
-                load.value.store(&mut loads.0[0][part * L::WIDTH..]);
-                for i in 0..N {
-                    load.slope[i].store(&mut loads.1[i][part * L::WIDTH..]);
+                load.value.store(&mut values[part * L::WIDTH..]);
+                for (lanes, slope) in load.slope.iter().zip(&mut slopes) {
+                    lanes.store(&mut slope[part * L::WIDTH..]);
                 }
             }
             for (stage, one) in modulation.iter_mut().enumerate() {
-                one.value = L::splat(token, loads.0[0][stage]);
-                for i in 0..N {
-                    one.slope[i] = L::splat(token, loads.1[i][stage]);
+                one.value = L::splat(token, values[stage]);
+                for (lanes, slope) in one.slope.iter_mut().zip(&slopes) {
+                    *lanes = L::splat(token, slope[stage]);
                 }
             }
             for bundle in &mut bundles {
@@ -154,8 +154,8 @@ impl<const N: usize> Motions<'_, N> {
             }
         }
         for (chunk, bundle) in moving.chunks_mut(L::WIDTH).zip(&bundles) {
-            for k in 0..2 {
-                scattered(&bundle[k], chunk, k);
+            for (k, lanes) in bundle.iter().enumerate() {
+                scattered(lanes, chunk, k);
             }
         }
     }
@@ -165,8 +165,8 @@ impl<const N: usize> Motions<'_, N> {
 #[inline(always)]
 fn splat<L: Lane, const N: usize>(token: L::Token, number: Tangent<f64, N>) -> Tangent<L, N> {
     let mut slope = [L::splat(token, 0.0); N];
-    for i in 0..N {
-        slope[i] = L::splat(token, number.slope[i]);
+    for (lanes, own) in slope.iter_mut().zip(number.slope) {
+        *lanes = L::splat(token, own);
     }
     Tangent { value: L::splat(token, number.value), slope }
 }

@@ -1,9 +1,9 @@
 //! The bifurcation set of a plane: curves of folds, doublings and symmetry breakings.
 //!
-//! Branches are followed along sections of the plane, in both directions in turn, each in the largest gap that the golden
-//! section leaves. On a section orbits are searched at some places, as by [`super::orbits`]. Each event on
-//! their branches is a point of a curve, which is followed if none passes there yet, until several sections in a row have
-//! had no new one.
+//! Branches are followed along sections of the plane: first along its edges, where every curve ends that does not end within,
+//! then in both directions in turn, each in the largest gap that the golden section leaves. On a section all orbits are
+//! searched at some places, as by [`super::every_orbit`]. Each event on their branches is a point of a curve, which is followed
+//! if none passes there yet, until sections in a row have had no new one.
 
 use super::control::Control;
 use super::every_orbit::every_orbit;
@@ -16,12 +16,12 @@ use crate::error::Error;
 
 /// Sections at least, at most, and in a row without a new curve.
 const LEAST: usize = 6;
-const MOST: usize = 12;
+const MOST: usize = 9;
 const QUIET: usize = 2;
 /// Distance of the first sections from the edges.
 const EDGE: f64 = 1e-3;
 /// Places along a section at which orbits are searched: at least, at most, and in a row without a new branch.
-const PLACES: [usize; 3] = [4, 12, 2];
+const PLACES: [usize; 3] = [4, 8, 2];
 /// Lengths of steps, in units of the fastest small oscillation, of curves and of what they are begun from: they err by 1e-11
 /// and 1e-9 in a few periods.
 const STEP: f64 = 0.055;
@@ -118,8 +118,6 @@ impl Curves {
         let course = self.plane.course.along(axis, held.1).by(SEED_STEP);
         let mut family = Family::new(course, Bounds { low: 0.0, high: 1.0 }, request.longest)?;
         let mut section = Section { held, places: 0, orbits: 0, new: 0 };
-        let t0 = std::time::Instant::now();
-        let (mut ts, mut tf) = (0.0, 0.0);
         let [least, most, quiet] = PLACES;
         let mut idle = 0;
         for k in 0..most {
@@ -129,41 +127,21 @@ impl Curves {
             let at = (0.5 + GOLDEN * k as f64).fract();
             let known = family.branches.len();
             let pendulum = family.pendulum(at);
-            let t = std::time::Instant::now();
             let all = every_orbit(&pendulum, request.longest, request.threads, control)?;
-            ts += t.elapsed().as_secs_f64();
-            let t = std::time::Instant::now();
             for orbit in all.iter().filter(|orbit| request.wants(orbit.n, orbit.w)) {
                 section.orbits += 1;
                 if !family.passes(orbit, at) {
                     family.add(orbit, at, control.flag())?;
                 }
             }
-            tf += t.elapsed().as_secs_f64();
             section.places += 1;
             idle = if family.branches.len() > known { 0 } else { idle + 1 };
         }
-        let t = std::time::Instant::now();
         section.new = self.add(&family, (axis, held.1), request, control)?;
-        if std::env::var("CV_DEBUG").is_ok() {
-            let steps: usize = family.branches.iter().map(|b| b.run.orbits.len()).sum();
-            let events: usize = family.branches.iter().map(|b| b.run.events.len()).sum();
-            let points: usize = self.plane.curves.iter().map(|c| c.points.len()).sum();
-            eprintln!(
-                "{held:?} places {} orbits {} branches {} steps {steps} events {events} new {} curves {} points {points}: search {ts:.2} follow {tf:.2} curves {:.2} all {:.2}",
-                section.places,
-                section.orbits,
-                family.branches.len(),
-                section.new,
-                self.plane.curves.len(),
-                t.elapsed().as_secs_f64(),
-                t0.elapsed().as_secs_f64()
-            );
-        }
         Ok(section)
     }
 
-    /// Adds the curves through the events of the branches from one on; the number of new ones.
+    /// Adds the curves through the events of the branches; the number of new ones.
     fn add(
         &mut self,
         family: &Family,

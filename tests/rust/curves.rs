@@ -11,6 +11,8 @@ use pendmap::continuation::cycle::Closure;
 use pendmap::continuation::event::Kind;
 use pendmap::continuation::family::Family;
 use pendmap::continuation::plane::{Curve, Plane, Seed};
+use pendmap::maps::control::Control;
+use pendmap::maps::curves::{Request, curves};
 use pendmap::model::{Parameter, Pendulum};
 use pendmap::orbit::{PoincareMap, newton};
 
@@ -128,4 +130,32 @@ fn the_fold_of_the_oscillation_begins_where_the_doubling_of_rest_changes() {
     assert_eq!((fold.kind, fold.of.n, fold.of.closure), (Kind::Fold, 2, Closure::Half));
     let found = amplitudes(&plane, fold, 1.8);
     assert!(found.iter().any(|p| (p - 0.210425102330).abs() < 1e-11), "{found:?}");
+}
+
+#[test]
+fn a_search_for_some_types_has_curves_of_these_alone_and_reasons_for_their_ends() {
+    let base = Pendulum::new(0.1, 1.0, 2.0, 0.0, 0.0).unwrap();
+    let request = Request { longest: 2, only: Some(vec![(1, 1)]), threads: 1 };
+    let law = |[low, high]: [f64; 2]| Law::Quadratic([low, high - low, 0.0]);
+    let axes =
+        vec![vec![(Parameter::P, law([0.0, 1.6]))], vec![(Parameter::Omega, law([1.8, 2.2]))]];
+    let found = curves(&Course::new(base, axes), &request, &Control::default()).unwrap();
+    let kinds: Vec<Kind> = found.plane.curves.iter().map(|curve| curve.kind).collect();
+    assert!(kinds.contains(&Kind::Fold) && kinds.contains(&Kind::PeriodDoubling));
+    for curve in &found.plane.curves {
+        assert_eq!((curve.of.n, curve.of.w), (1, 1));
+        assert_eq!(curve.ends, [End::Range; 2]);
+    }
+}
+
+#[test]
+fn a_branch_has_few_steps_where_motions_part_within_a_period() {
+    let base = Pendulum::new(0.1, 2.4975, 1.0, 0.0, 0.0).unwrap();
+    let course = Course::of(&base, Parameter::Omega);
+    let mut family = Family::new(course, Bounds { low: 0.6, high: 1.5 }, 1).unwrap();
+    let rest = newton::find(&PoincareMap::new(&base), [0.0, 0.0], 1, 1.0).unwrap();
+    family.add(&rest, 1.0, &AtomicBool::new(false)).unwrap();
+    let shed = family.branches.iter().filter(|branch| branch.of.closure == Closure::Whole);
+    let steps: Vec<usize> = shed.map(|branch| branch.run.orbits.len()).collect();
+    assert!(!steps.is_empty() && steps.iter().all(|count| *count < 400), "{steps:?}");
 }
