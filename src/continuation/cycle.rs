@@ -158,7 +158,7 @@ impl Cycles<'_> {
     }
 
     /// The sign of the closing map, and its shift.
-    fn closing(&self) -> (f64, f64) {
+    pub(super) fn closing(&self) -> (f64, f64) {
         match self.of.closure {
             Closure::Whole | Closure::Rest => (1.0, -TAU * self.of.w as f64),
             Closure::Half => (-1.0, 2.0 * self.of.centre),

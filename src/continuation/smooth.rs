@@ -11,8 +11,8 @@ use super::course::Course;
 use crate::integrate::State;
 use crate::integrate::kernel::tableau::{A, B, BP, C, STAGES};
 use crate::integrate::tangent::Tangent;
-use crate::lanes::Real;
 use crate::lanes::sine::Fine;
+use crate::lanes::{InstructionSet, Isa, Job, Real, dispatch};
 use crate::model::Equation;
 use crate::orbit::poincare::STEP;
 
@@ -55,13 +55,28 @@ pub fn carry<const N: usize>(
         [theta.scale(FRAC_1_PI), velocity * steps.kick]
     };
     let mut moving: Vec<[Tangent<f64, N>; 2]> = states.iter().map(begun).collect();
-    for k in 0..steps.count {
-        let loads = steps.loads(k);
-        for motion in &mut moving {
-            *motion = step(*motion, &loads, steps.decay);
+    let simd = InstructionSet::choose().unwrap_or(InstructionSet::Portable);
+    dispatch::run(simd, Motions { steps: &steps, moving: &mut moving });
+    moving.into_iter().map(|[x, kick]| [x.scale(PI), kick / steps.kick]).collect()
+}
+
+/// Motions of one period, and the steps that carry them.
+struct Motions<'a, const N: usize> {
+    steps: &'a Steps<N>,
+    moving: &'a mut [[Tangent<f64, N>; 2]],
+}
+
+impl<const N: usize> Job for Motions<'_, N> {
+    type Output = ();
+    #[inline(always)]
+    fn run<S: Isa>(self, _: S) {
+        for k in 0..self.steps.count {
+            let loads = self.steps.loads(k);
+            for motion in self.moving.iter_mut() {
+                *motion = step(*motion, &loads, self.steps.decay);
+            }
         }
     }
-    moving.into_iter().map(|[x, kick]| [x.scale(PI), kick / steps.kick]).collect()
 }
 
 impl<const N: usize> Steps<N> {
@@ -89,6 +104,7 @@ impl<const N: usize> Steps<N> {
         Self { equation, length, times, factors, kick: folded.scale(FRAC_1_PI), decay, count }
     }
 
+    #[inline(always)]
     fn loads(&self, k: usize) -> Loads<N> {
         let start = self.length.scale(k as f64);
         let none = [start; STAGES];
@@ -124,6 +140,7 @@ fn series<const N: usize>(
 }
 
 /// One step of the angle in half turns and the kick.
+#[inline(always)]
 fn step<const N: usize>(
     [x, kick]: [Tangent<f64, N>; 2],
     loads: &Loads<N>,

@@ -1,4 +1,4 @@
-//! Starting points for Newton's method: all points at which a field over the plane may vanish.
+//! Starting points for Newton's method: all points at which a field over the plane may vanish, or have a number of turns.
 //!
 //! [`places`] divides the plane into cells. In a cell the field is compared with its linear part `J`, both
 //! multiplied by `1 / J`: at a zero, at `x` from the centre in cells, `x + J^-1 F(0)` is the negative of the
@@ -9,6 +9,7 @@
 //! [`approach`] then takes steps of Newton's method by finite differences from many places at once.
 
 use std::collections::HashSet;
+use std::f64::consts::TAU;
 
 use nalgebra::{Matrix2, Vector2};
 
@@ -34,7 +35,7 @@ const DIFFERENCE: f64 = 1e-5;
 /// Largest step in the plane.
 const LONGEST_STEP: f64 = 0.5;
 /// Size of the field at which Newton's method has converged.
-const NEAR: f64 = 1e-4;
+const NEAR: f64 = 1e-7;
 /// Distance below which two points are identical.
 const SAME: f64 = 1e-5;
 
@@ -48,16 +49,20 @@ struct Cell {
     corner: State,
     /// The zero of the linear part.
     aim: State,
+    /// The turns that the field has there.
+    turns: i64,
 }
 
-/// Points from which Newton's method should find all zeros in the box.
+/// Points from which Newton's method should find all places in the box at which the field is a number of turns from the
+/// least to the most, in its first component; with this number.
 ///
 /// # Errors
 /// Errors of `field`, which is evaluated at many points at once.
 pub(super) fn places(
     axes: [Axis; 2],
+    turns: [i64; 2],
     mut field: impl FnMut(&[State]) -> Result<Vec<State>, Error>,
-) -> Result<Vec<State>, Error> {
+) -> Result<Vec<(State, i64)>, Error> {
     let [theta, velocity] = axes;
     let mut size = axes.map(|axis| (axis.high - axis.low) / axis.count as f64);
     // From a ring outside the box on.
@@ -73,7 +78,7 @@ pub(super) fn places(
         for i in 0..theta.count {
             let patch = |k: usize| values[(j + k / 4) * columns + i + k % 4];
             let corner = nodes[(j + 1) * columns + i + 1];
-            cells.extend(judge(corner, size, &std::array::from_fn(patch)));
+            cells.extend(judged(corner, size, turns, &std::array::from_fn(patch)));
         }
     }
     for _ in 0..LEVELS {
@@ -91,21 +96,43 @@ pub(super) fn places(
         let nodes: Vec<State> = cells.iter().flat_map(around).collect();
         let values = field(&nodes)?;
         let mut smaller = Vec::new();
-        for (nodes, values) in nodes.chunks_exact(25).zip(values.chunks_exact(25)) {
+        let parts = nodes.chunks_exact(25).zip(values.chunks_exact(25));
+        for (cell, (nodes, values)) in cells.iter().zip(parts) {
             for quarter in 0..4 {
                 let (i, j) = (quarter % 2, quarter / 2);
                 let patch = |k: usize| values[(j + k / 4) * 5 + i + k % 4];
                 let corner = nodes[(j + 1) * 5 + i + 1];
-                smaller.extend(judge(corner, half, &std::array::from_fn(patch)));
+                let turns = [cell.turns; 2];
+                smaller.extend(judged(corner, half, turns, &std::array::from_fn(patch)));
             }
         }
         (cells, size) = (smaller, half);
     }
-    Ok(cells.iter().map(|cell| cell.aim).collect())
+    Ok(cells.iter().map(|cell| (cell.aim, cell.turns)).collect())
 }
 
-/// The cell, if the field may vanish in it.
-fn judge(corner: State, size: [f64; 2], patch: &Patch) -> Option<Cell> {
+/// The cell with each number of turns, from the least to the most, that the field may have in it.
+fn judged(
+    corner: State,
+    size: [f64; 2],
+    [least, most]: [i64; 2],
+    patch: &Patch,
+) -> impl Iterator<Item = Cell> {
+    let [mut low, mut high] = [f64::INFINITY, f64::NEG_INFINITY];
+    for [first, _] in patch {
+        (low, high) = (low.min(*first), high.max(*first));
+    }
+    let spare = CLEAR * (high - low);
+    // A value that is not a number gives none.
+    let [from, to] = [((low - spare) / TAU).ceil() as i64, ((high + spare) / TAU).floor() as i64];
+    let shifted = move |turns: i64| patch.map(|[a, b]| [a - TAU * turns as f64, b]);
+    (from.max(least)..=to.min(most)).filter_map(move |turns| {
+        judge(corner, size, &shifted(turns)).map(|aim| Cell { corner, aim, turns })
+    })
+}
+
+/// The zero of the linear part, if the field may vanish in the cell.
+fn judge(corner: State, size: [f64; 2], patch: &Patch) -> Option<State> {
     let [mut low, mut high] = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
     for value in patch.iter().flatten().zip([0, 1].into_iter().cycle()) {
         let (value, k) = value;
@@ -124,7 +151,7 @@ fn judge(corner: State, size: [f64; 2], patch: &Patch) -> Option<Cell> {
     let mean = 0.25 * (value(5) + value(6) + value(9) + value(10));
     let along = 0.5 * (value(6) + value(10) - value(5) - value(9));
     let up = 0.5 * (value(9) + value(10) - value(5) - value(6));
-    let unresolved = Some(Cell { corner, aim: centre });
+    let unresolved = Some(centre);
     let Some(inverse) = Matrix2::from_columns(&[along, up]).try_inverse() else {
         return unresolved;
     };
@@ -142,31 +169,32 @@ fn judge(corner: State, size: [f64; 2], patch: &Patch) -> Option<Cell> {
         return unresolved;
     }
     // At most to the cell's edge: the linear part is unknown beyond.
-    let aim = [0, 1].map(|k| centre[k] - from_centre[k].clamp(-1.0, 1.0) * size[k]);
-    Some(Cell { corner, aim })
+    Some([0, 1].map(|k| centre[k] - from_centre[k].clamp(-1.0, 1.0) * size[k]))
 }
 
 /// A start during the iteration.
 struct Iteration {
     first: State,
     point: State,
+    turns: i64,
     least: f64,
     best: State,
     begun_at: f64,
 }
 
-/// The points near zeros of the field that the starts reach within `reach`, each once.
+/// The points that the starts reach within `reach` near places at which the field is their number of turns, each once.
 ///
 /// # Errors
 /// Errors of `field`, which is evaluated at many points at once.
 pub(super) fn approach(
-    starts: &[State],
+    starts: &[(State, i64)],
     reach: f64,
     mut field: impl FnMut(&[State]) -> Result<Vec<State>, Error>,
 ) -> Result<Vec<State>, Error> {
-    let begun = |start: &State| Iteration {
+    let begun = |(start, turns): &(State, i64)| Iteration {
         first: *start,
         point: *start,
+        turns: *turns,
         least: f64::INFINITY,
         best: *start,
         begun_at: f64::INFINITY,
@@ -187,7 +215,8 @@ pub(super) fn approach(
         let values = field(&nodes)?;
         let mut on = Vec::new();
         for (mut w, values) in iterations.into_iter().zip(values.chunks_exact(3)) {
-            let [at, right, above] = [values[0], values[1], values[2]].map(Vector2::from);
+            let shift = Vector2::new(TAU * w.turns as f64, 0.0);
+            let [at, right, above] = [0, 1, 2].map(|k| Vector2::from(values[k]) - shift);
             let size = at.norm();
             if iteration == 0 {
                 w.begun_at = size;
