@@ -129,6 +129,7 @@ class Continuation:
     n: _Places
     w: _Places
     symmetric: list[bool]
+    kind: list[str]
     ends: list[tuple[str, str]]
     meets: list[tuple[int, int]]
     twin: _Places
@@ -145,6 +146,8 @@ class Continuation:
     event_orbit: _Places
     supercritical: _Places
     smooth: list[bool]
+    regions: list[tuple[float, float]]
+    stable: list[tuple[int, int]]
     sections: list[tuple[float, int]]
 
 @final
@@ -279,6 +282,7 @@ class Followed:
 
 @final
 class Bifurcation(ParameterMap):
+    branch: _Places
     point_entry: _Places
     point_theta: _Floats
     point_velocity: _Floats
@@ -439,9 +443,9 @@ def orbits(
 def continuation(
     model: Pendulum,
     along: tuple[Sequence[float], _Range],
-    winding: tuple[int, int],
+    sought: tuple[int, int | None],
     longest: int,
-    start: tuple[float, float, float] | None,
+    starts: Sequence[tuple[float, float, int, float]] | None,
     threads: int,
     progress: _Progress | None = None,
 ) -> Continuation: ...
@@ -454,8 +458,24 @@ def bifurcation_set(
     progress: _Progress | None = None,
 ) -> BifurcationSet: ...
 def orbits_near(
-    model: Pendulum, steps: int, states: Sequence[tuple[float, float, int, bool | None]]
+    model: Pendulum,
+    along: Sequence[tuple[str, float, float]],
+    steps: int,
+    states: Sequence[tuple[float, float, int | None, bool | None]],
 ) -> list[tuple[int, list[_Pair]] | None]: ...
+def distance(
+    one: Sequence[Sequence[float]], other: Sequence[Sequence[float]], circle: bool = True
+) -> float: ...
+def matched(
+    old: Sequence[Sequence[Sequence[float]]],
+    new: Sequence[Sequence[Sequence[float]]],
+    reach: Sequence[Sequence[float]],
+    continued: Sequence[tuple[int, int]] = (),
+    circle: bool = True,
+) -> list[tuple[bool, float, int, int]]: ...
+def numbered(
+    sizes: Sequence[int], links: Sequence[tuple[tuple[int, int], tuple[int, int]]]
+) -> list[list[int]]: ...
 def parameter_names(model: Pendulum) -> list[str]: ...
 def lyapunov(
     model: Pendulum,

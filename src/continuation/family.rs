@@ -18,6 +18,8 @@ use crate::orbit::symmetry::Mirror;
 
 /// Largest distance of the last orbit of a branch from the orbit that it meets.
 const MEETS: f64 = 1e-3;
+/// Distance from the event of a parent's branch at which the branch is begun, over the range.
+const BESIDE: f64 = 1e-4;
 
 /// A branch of orbits of one type.
 #[derive(Clone, Debug)]
@@ -137,6 +139,20 @@ impl Family {
         Ok(true)
     }
 
+    /// A state at the upper end of the range of the orbit that one at the lower end leads to; none where its branch turns
+    /// back or ends before.
+    #[must_use]
+    pub fn carried(&self, orbit: &PeriodicOrbit, cancel: &AtomicBool) -> Option<State> {
+        let at = self.bounds.low;
+        let (of, points) = self.type_of(orbit, at)?;
+        let cycles = self.cycles(of);
+        let first = cycles.near(&cycles.place(&points, at), &cycles.along())?;
+        let (run, end) = cycles.followed(&first, self.bounds, cancel).ok()?;
+        let folds = run.events.iter().any(|event| event.kind == Kind::Fold);
+        let last = cycles.points(&run.orbits.last()?.place)[0];
+        (end == End::Range && !folds).then(|| [self.course.base.angle().wrapped(last[0]), last[1]])
+    }
+
     /// The type of an orbit and the points that [`Cycles`] has of it.
     fn type_of(&self, orbit: &PeriodicOrbit, at: f64) -> Option<(Type, Vec<State>)> {
         let map = Period::<3>::new(&self.course, &[at]);
@@ -169,10 +185,15 @@ impl Family {
         Some((of, points))
     }
 
-    /// Adds what the branches from this one on shed, and what that sheds.
+    /// Adds what the branches from this one on shed, the branches that they are shed by, and so on.
     fn grow(&mut self, from: usize, cancel: &AtomicBool) -> Result<(), Error> {
         let mut next = from;
         while next < self.branches.len() {
+            for end in 0..2 {
+                if let Some((of, first)) = self.unknown_parent(next, end) {
+                    self.branches.push(self.cycles(of).both_ways(first, self.bounds, cancel)?);
+                }
+            }
             for number in 0..self.branches[next].run.events.len() {
                 let branch = &self.branches[next];
                 let Event { kind, orbit, rises, smooth, .. } = branch.run.events[number];
@@ -181,6 +202,11 @@ impl Family {
                 }
                 let cycles = self.cycles(branch.of);
                 let orbit = &branch.run.orbits[orbit];
+                if kind == Kind::NeimarkSacker {
+                    let supercritical = cycles.sheds_stable_curve(orbit);
+                    self.branches[next].run.events[number].supercritical = supercritical;
+                    continue;
+                }
                 let Some(of) = cycles.shed_type(kind) else { continue };
                 let place = (cycles.all_points(&orbit.place), cycles.at(&orbit.place));
                 // Along the coordinate, a multiplier is beyond the critical value where the test falls below 0.
@@ -217,6 +243,36 @@ impl Family {
         Ok(())
     }
 
+    /// An orbit of the branch that a branch ends on, if none is known.
+    fn unknown_parent(&self, branch: usize, end: usize) -> Option<(Type, Orbit)> {
+        let Branch { of, run, ends, meets, .. } = &self.branches[branch];
+        if !matches!(ends[end], End::Rest | End::Parent) || meets[end].is_some() {
+            return None;
+        }
+        let orbit = if end == 0 { run.orbits.first() } else { run.orbits.last() };
+        let (of, place) = self.cycles(*of).parent(orbit?)?;
+        let cycles = self.cycles(of);
+        // Beside the event, which lies between two orbits then.
+        let [above, below] = [BESIDE, -BESIDE].map(|by| {
+            let mut place = place.clone();
+            let last = place.len() - 1;
+            place[last] += by;
+            cycles
+                .near(&place, &cycles.along())
+                .filter(|one| self.bounds.holds(cycles.at(&one.place)))
+        });
+        let first = above.or(below)?;
+        let at = cycles.at(&first.place);
+        let own = |branch: &&Branch| {
+            (branch.of.n, branch.of.w, branch.of.closure) == (of.n, of.w, of.closure)
+        };
+        let passes = |branch: &Branch| {
+            branch.at(&self.cycles(branch.of), at).iter().any(|found| cycles.is_same(found, &first))
+        };
+        let known = self.branches.iter().filter(own).any(passes);
+        (!known).then_some((of, first))
+    }
+
     /// The end of a branch of this type that meets the orbit with these points, if its parent is not known yet.
     fn end_at(&self, of: Type, points: &[State], at: f64) -> Option<(usize, usize)> {
         let angle = self.course.base.angle();
@@ -247,17 +303,19 @@ impl Family {
         None
     }
 
-    /// Adds the mirror images of branches of asymmetric orbits.
-    pub fn mirror(&mut self) {
+    /// Adds the mirror images of branches of asymmetric orbits, of those that turn only if `turning`.
+    pub fn mirror(&mut self, turning: bool) {
         if self.symmetry != Some(Symmetry::AtOnce) {
             return;
         }
         for index in 0..self.branches.len() {
             let branch = &self.branches[index];
-            if branch.of.closure != Closure::Whole || branch.of.w != 0 || branch.twin.is_some() {
+            let own = branch.of.closure == Closure::Whole && (branch.of.w == 0 || turning);
+            if !own || branch.twin.is_some() {
                 continue;
             }
             let mut image = branch.clone();
+            image.of.w = -image.of.w;
             for orbit in &mut image.run.orbits {
                 let last = orbit.place.len() - 1;
                 orbit.place.rows_mut(0, last).neg_mut();

@@ -5,7 +5,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use nalgebra::Vector2;
+use nalgebra::{DVector, Vector2};
 
 use super::branch::{End, interpolated};
 use super::cycle::{Closure, Cycles, Orbit, Type};
@@ -71,6 +71,24 @@ impl Cycles<'_> {
         all
     }
 
+    /// The orbit that one at the end of a branch is a special case of: its type and place.
+    pub(super) fn parent(&self, last: &Orbit) -> Option<(Type, DVector<f64>)> {
+        let all = self.special(last).into_iter();
+        let (of, ..) = all.min_by(|a, b| a.2.norm().total_cmp(&b.2.norm()))?;
+        Some((of, self.as_special(of, &last.place)))
+    }
+
+    /// A place as one of orbits with half the period or more symmetry.
+    fn as_special(&self, of: Type, place: &DVector<f64>) -> DVector<f64> {
+        let other = Cycles { of, ..*self };
+        let mut points = self.points(place);
+        if of.closure == Closure::Rest {
+            points = vec![[of.centre, 0.0]];
+        }
+        points.truncate(other.count());
+        other.place(&points, self.at(place))
+    }
+
     /// The end of the branch between two orbits on one with more symmetry, and the orbit there.
     pub(super) fn meeting(&self, here: &Orbit, next: &Orbit) -> Option<(End, Orbit)> {
         let (of, test, part) = self.met_type(here, next)?;
@@ -94,18 +112,9 @@ impl Cycles<'_> {
 
     /// The orbit of another type near a place at which one of its tests vanishes, by the secant method, as an orbit of this
     /// type.
-    fn met(
-        &self,
-        (of, test): (Type, usize),
-        near: &nalgebra::DVector<f64>,
-    ) -> Option<nalgebra::DVector<f64>> {
+    fn met(&self, (of, test): (Type, usize), near: &DVector<f64>) -> Option<DVector<f64>> {
         let other = Cycles { of, ..*self };
-        let mut points = self.points(near);
-        if of.closure == Closure::Rest {
-            points = vec![[of.centre, 0.0]];
-        }
-        points.truncate(other.count());
-        let mut place = other.place(&points, self.at(near));
+        let mut place = self.as_special(of, near);
         let last = place.len() - 1;
         let mut before: Option<(f64, f64)> = None;
         for _ in 0..REFINEMENTS {

@@ -6,9 +6,10 @@
 //! - [`cycle`]: closed orbits as zeros, by Newton's method; their multipliers; symmetry
 //! - [`branch`]: steps along a branch, and why it ends; `meeting`: on another one
 //! - [`event`]: folds, doublings, symmetry breakings; [`shed`]: the branches that begin there
+//! - `neimark_sacker`: the invariant curves that begin where a complex pair passes the unit circle
 //! - `swing`: amplitudes
 //! - `transition`: where slips and sticks change
-//! - [`family`]: branches, and what they shed
+//! - [`family`]: branches, and what they shed; [`regions`]: where the same orbits are stable
 //! - [`critical`]: orbits with a critical multiplier in the plane of two coordinates; `normal_form`: which side the
 //!   new orbits live on; [`curve`]: curves of them; [`plane`]: all curves
 
@@ -21,10 +22,12 @@ pub mod cycle;
 pub mod event;
 pub mod family;
 mod meeting;
+mod neimark_sacker;
 mod normal_form;
 pub mod period;
 pub mod phases;
 pub mod plane;
+pub mod regions;
 pub mod shed;
 mod smooth;
 mod swing;

@@ -1,4 +1,4 @@
-//! All branches of orbits of one type along a parameter.
+//! All branches of orbits of one type, or of all types up to a period, along a parameter.
 //!
 //! Orbits are searched as by [`super::orbits`] at sections of the range, each in the largest gap that the golden section
 //! leaves. A branch is followed through each orbit that none passes through yet, until several sections in a row have
@@ -10,33 +10,42 @@ use super::starts::Axis;
 use crate::continuation::branch::Bounds;
 use crate::continuation::course::Course;
 use crate::continuation::family::Family;
+use crate::continuation::regions::Region;
 use crate::error::Error;
 use crate::integrate::State;
 use crate::model::Pendulum;
+use crate::model::pendulum::Symmetry;
 use crate::orbit::{PoincareMap, newton};
 
 /// Sections at least, at most, and in a row without a new branch.
 const LEAST: usize = 5;
 const MOST: usize = 40;
 const QUIET: usize = 3;
-/// Cells along a side of the box of a search, a period, and periods counted.
+/// Cells along a side of the box of a search, a period, of one type and of all, and periods counted.
 const CELLS: usize = 200;
+const FEWER: usize = 60;
 const FINER: usize = 4;
 /// Largest distance of Newton's method from a given start.
 const REACH: f64 = 0.5;
 
+/// The orbits that are searched.
+#[derive(Clone, Debug)]
+pub enum Sought {
+    /// Those of this smallest period, in forcing periods, and these net turns over it.
+    Type(usize, i64),
+    /// All up to this period, with the mirror images of those that turn.
+    UpTo(usize),
+    /// Those that Newton's method finds from these states, with their periods and coordinates.
+    Near(Vec<(State, usize, f64)>),
+}
+
 /// A request for branches.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Request {
-    /// Smallest period of the orbits searched, in forcing periods.
-    pub n: usize,
-    /// Net turns over it.
-    pub w: i64,
+    /// The orbits searched.
+    pub sought: Sought,
     /// Longest period of the orbits of branches that are begun at doublings.
     pub longest: usize,
-    /// A state from which Newton's method finds the one orbit to be followed, at the course's own pendulum and this
-    /// coordinate; none for all.
-    pub start: Option<(State, f64)>,
     /// Workers; 0 for one a processor.
     pub threads: usize,
 }
@@ -48,6 +57,8 @@ pub struct Branches {
     pub family: Family,
     /// The sections, and the number of orbits found at each.
     pub sections: Vec<(f64, usize)>,
+    /// The regions with the same stable orbits; none where not all were searched.
+    pub regions: Vec<Region>,
 }
 
 /// All branches of a type in the range.
@@ -61,7 +72,11 @@ pub fn branches(
     request: &Request,
     control: &Control,
 ) -> Result<Branches, Error> {
-    for (name, value) in [("n", request.n), ("longest", request.longest)] {
+    let n = match &request.sought {
+        Sought::Type(n, _) | Sought::UpTo(n) => *n,
+        Sought::Near(starts) => starts.iter().map(|(_, n, _)| *n).max().unwrap_or(1),
+    };
+    for (name, value) in [("n", n), ("longest", request.longest)] {
         if !(1..=LONGEST).contains(&value) {
             let allowed = "a whole number from 1 to 64";
             return Err(Error::Range { name, value: value as f64, allowed });
@@ -69,13 +84,19 @@ pub fn branches(
     }
     let mut family = Family::new(course.clone(), bounds, request.longest)?;
     let mut sections = Vec::new();
-    if let Some((start, at)) = request.start {
-        let map = PoincareMap::new(&family.pendulum(at));
-        let found = newton::find(&map, start, request.n, REACH);
-        let orbit = found.ok_or(Error::NoOrbit { n: request.n, start })?;
-        family.add(&orbit, at, control.flag())?;
-        family.mirror();
-        return Ok(Branches { family, sections });
+    if let Sought::Near(starts) = &request.sought {
+        for &(start, n, at) in starts {
+            let map = PoincareMap::new(&family.pendulum(at));
+            let found = newton::find(&map, start, n, REACH);
+            if let Some(orbit) = found.filter(|orbit| !family.passes(orbit, at)) {
+                family.add(&orbit, at, control.flag())?;
+            }
+        }
+        if let (true, Some(&(start, n, _))) = (family.branches.is_empty(), starts.first()) {
+            return Err(Error::NoOrbit { n, start });
+        }
+        family.mirror(false);
+        return Ok(Branches { family, sections, regions: Vec::new() });
     }
     let mut quiet = 0;
     for k in 0..MOST {
@@ -86,13 +107,10 @@ pub fn branches(
         let part = (0.5 + 0.618_033_988_749_895 * k as f64).fract();
         let at = bounds.low + part * (bounds.high - bounds.low);
         let pendulum = family.pendulum(at);
-        let window = window(
-            &pendulum,
-            (request.n, request.w),
-            CELLS * request.n.min(FINER),
-            request.threads,
-        )?;
-        let found = orbits::orbits(&pendulum, &window, control)?.closed;
+        let mut found = Vec::new();
+        for asked in asked(&pendulum, request, family.symmetry)? {
+            found.extend(orbits::orbits(&pendulum, &asked, control)?.closed);
+        }
         let mut new = false;
         for orbit in &found {
             if !family.passes(orbit, at) {
@@ -102,20 +120,52 @@ pub fn branches(
         sections.push((at, found.len()));
         quiet = if new { 0 } else { quiet + 1 };
     }
-    family.mirror();
-    Ok(Branches { family, sections })
+    let all = matches!(request.sought, Sought::UpTo(_));
+    family.mirror(all);
+    let regions = if all { family.regions() } else { Vec::new() };
+    Ok(Branches { family, sections, regions })
 }
 
-/// The box of a search: velocities to that of the rotation and of a fall from the top under the drive's largest
-/// acceleration.
-pub(super) fn window(
+/// The searches at one section. Orbits turn on average no faster than the fastest start; those that turn backward are
+/// left out where they are mirror images.
+fn asked(
     pendulum: &Pendulum,
-    (n, w): (usize, i64),
+    request: &Request,
+    symmetry: Option<Symmetry>,
+) -> Result<Vec<Search>, Error> {
+    match request.sought {
+        Sought::Near(_) => Ok(Vec::new()),
+        Sought::Type(n, w) => {
+            let turning = w.unsigned_abs() as f64 / n as f64 * pendulum.drive.omega;
+            Ok(vec![window(pendulum, (n, [w; 2]), turning, CELLS * n.min(FINER), request.threads)?])
+        }
+        Sought::UpTo(most) => {
+            let fastest = pendulum.drive.omega + falling(pendulum);
+            let one = |n: usize| {
+                let turns = (n as f64 * fastest / pendulum.drive.omega).floor() as i64;
+                let least = if symmetry == Some(Symmetry::AtOnce) { 0 } else { -turns };
+                let w = [least, turns];
+                window(pendulum, (n, w), pendulum.drive.omega, FEWER * n, request.threads)
+            };
+            (1..=most).map(one).collect()
+        }
+    }
+}
+
+/// The velocity of a fall from the top under the drive's largest acceleration.
+fn falling(pendulum: &Pendulum) -> f64 {
+    2.0 * (1.0 + pendulum.drive.p.abs()).sqrt()
+}
+
+/// The box of a search: velocities to that of a rotation and of a fall.
+fn window(
+    pendulum: &Pendulum,
+    (n, w): (usize, [i64; 2]),
+    turning: f64,
     cells: usize,
     threads: usize,
 ) -> Result<Search, Error> {
-    let turning = w.unsigned_abs() as f64 / n as f64 * std::f64::consts::TAU / pendulum.period();
-    let reach = turning + 2.0 * (1.0 + pendulum.drive.p.abs()).sqrt();
+    let reach = turning + falling(pendulum);
     let pi = std::f64::consts::PI;
     let theta = Axis::new("theta", -pi, pi, cells)?;
     let velocity = Axis::new("velocity", -reach, reach, cells)?;

@@ -29,6 +29,8 @@ const MOST: usize = 4_000;
 /// Its largest distance from a start, in cells, and the least value of that distance.
 const REACH: f64 = 8.0;
 const LEAST_REACH: f64 = 0.3;
+/// Net turns that an orbit may have.
+const ANY_TURNS: [i64; 2] = [-1_000_000, 1_000_000];
 /// A start this near to an orbit leads to it.
 const KNOWN: f64 = 1e-3;
 
@@ -61,21 +63,21 @@ pub fn every_orbit(
     let map = if plain { PoincareMap::of_steps(&fine) } else { PoincareMap::new(pendulum) };
     let mut all: Vec<PeriodicOrbit> = Vec::new();
     for n in 1..=longest {
-        // The displacement; on the circle without turns.
-        let displacement = |from: &[State], turning: bool| -> Result<Vec<State>, Error> {
+        let displacement = |from: &[State]| -> Result<Vec<State>, Error> {
             let (ends, turns) = advance(&coarse, from, n, threads, control)?;
             let gap = |(start, (end, turns)): (&State, (State, i64))| {
                 let rest = coarse.angle.wrapped(end[0] - start[0]);
-                [rest + if turning { turns as f64 * TAU } else { 0.0 }, end[1] - start[1]]
+                [rest + turns as f64 * TAU, end[1] - start[1]]
             };
             Ok(from.iter().zip(ends.iter().zip(turns)).map(gap).collect())
         };
         let axes = grid(n)?;
-        let places = places(axes, Some(TAU), MOST, |from| displacement(from, true))?;
-        let spread: Vec<State> = places.iter().step_by(places.len() / MOST + 1).copied().collect();
+        let places = places(axes, ANY_TURNS, MOST, &displacement)?;
+        let spread: Vec<(State, i64)> =
+            places.iter().step_by(places.len() / MOST + 1).copied().collect();
         let cell = TAU / axes[0].count as f64;
         let far = LEAST_REACH.max(REACH * cell);
-        let near = approach(&spread, far, |from| displacement(from, false))?;
+        let near = approach(&spread, far, displacement)?;
         let known = |state: &State| all.iter().any(|orbit| orbit.contains(*state, KNOWN));
         let starts: Vec<(State, usize)> =
             near.into_iter().filter(|state| !known(state)).map(|state| (state, n)).collect();

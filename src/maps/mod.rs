@@ -17,6 +17,7 @@
 //! - [`advance`]: plain integration of many starts
 //! - [`bounds`]: the number of periods within which a trajectory must settle
 //! - `stored`: plans and blocks as bytes
+//! - [`matching`]: which attractors of neighbours are one
 //! - [`control`]: progress, cancellation, threads
 
 pub mod advance;
@@ -36,6 +37,7 @@ pub mod finite_time;
 mod kinked_tongues;
 pub mod label;
 pub mod lyapunov;
+pub mod matching;
 mod multistart;
 pub mod orbits;
 pub mod parameter_map;

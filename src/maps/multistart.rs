@@ -1,4 +1,4 @@
-//! Starting points for Newton's method: all points at which a field over the plane may vanish.
+//! Starting points for Newton's method: all points at which a field over the plane may vanish, or have a number of turns.
 //!
 //! [`places`] divides the plane into cells. In a cell the field is compared with its linear part `J`, both
 //! multiplied by `1 / J`: at a zero, at `x` from the centre in cells, `x + J^-1 F(0)` is the negative of the
@@ -9,6 +9,7 @@
 //! [`approach`] then takes steps of Newton's method by finite differences from many places at once.
 
 use std::collections::HashSet;
+use std::f64::consts::TAU;
 
 use nalgebra::{Matrix2, Vector2};
 
@@ -32,7 +33,7 @@ const DIFFERENCE: f64 = 1e-5;
 /// Largest step in the plane.
 const LONGEST_STEP: f64 = 0.5;
 /// Size of the field at which Newton's method has converged.
-const NEAR: f64 = 1e-4;
+const NEAR: f64 = 1e-7;
 /// Distance below which two points are identical.
 const SAME: f64 = 1e-5;
 
@@ -46,21 +47,21 @@ struct Cell {
     corner: State,
     /// The zero of the linear part.
     aim: State,
-    /// The value that the first component has there.
-    goal: f64,
+    /// The turns that the field has there.
+    turns: i64,
 }
 
-/// Points from which Newton's method should find all zeros in the box; with a `period` all points at which the first
-/// component is a multiple of it. Above `most` cells the field is not resolved, and they are not quartered.
+/// Points from which Newton's method should find all places in the box at which the field is a number of turns from the
+/// least to the most, in its first component; with this number.
 ///
 /// # Errors
 /// Errors of `field`, which is evaluated at many points at once.
 pub(super) fn places(
     axes: [Axis; 2],
-    period: Option<f64>,
+    turns: [i64; 2],
     most: usize,
     mut field: impl FnMut(&[State]) -> Result<Vec<State>, Error>,
-) -> Result<Vec<State>, Error> {
+) -> Result<Vec<(State, i64)>, Error> {
     let [theta, velocity] = axes;
     let mut size = axes.map(|axis| (axis.high - axis.low) / axis.count as f64);
     // From a ring outside the box on.
@@ -76,10 +77,7 @@ pub(super) fn places(
         for i in 0..theta.count {
             let patch = |k: usize| values[(j + k / 4) * columns + i + k % 4];
             let corner = nodes[(j + 1) * columns + i + 1];
-            let patch: Patch = std::array::from_fn(patch);
-            for goal in goals(&patch, period) {
-                cells.extend(judge(corner, size, &patch, goal));
-            }
+            cells.extend(judged(corner, size, turns, &std::array::from_fn(patch)));
         }
     }
     for _ in 0..LEVELS {
@@ -97,33 +95,43 @@ pub(super) fn places(
         let nodes: Vec<State> = cells.iter().flat_map(around).collect();
         let values = field(&nodes)?;
         let mut smaller = Vec::new();
-        let patches = nodes.chunks_exact(25).zip(values.chunks_exact(25)).zip(&cells);
-        for ((nodes, values), cell) in patches {
+        let parts = nodes.chunks_exact(25).zip(values.chunks_exact(25));
+        for (cell, (nodes, values)) in cells.iter().zip(parts) {
             for quarter in 0..4 {
                 let (i, j) = (quarter % 2, quarter / 2);
                 let patch = |k: usize| values[(j + k / 4) * 5 + i + k % 4];
                 let corner = nodes[(j + 1) * 5 + i + 1];
-                smaller.extend(judge(corner, half, &std::array::from_fn(patch), cell.goal));
+                let turns = [cell.turns; 2];
+                smaller.extend(judged(corner, half, turns, &std::array::from_fn(patch)));
             }
         }
         (cells, size) = (smaller, half);
     }
-    Ok(cells.iter().map(|cell| cell.aim).collect())
+    Ok(cells.iter().map(|cell| (cell.aim, cell.turns)).collect())
 }
 
-/// The multiples of the period that the first component may have in a cell.
-fn goals(patch: &Patch, period: Option<f64>) -> Vec<f64> {
-    let Some(period) = period else { return vec![0.0] };
-    let all = || patch.iter().map(|value| value[0]);
-    let (low, high) = (all().fold(f64::INFINITY, f64::min), all().fold(-f64::INFINITY, f64::max));
+/// The cell with each number of turns, from the least to the most, that the field may have in it.
+fn judged(
+    corner: State,
+    size: [f64; 2],
+    [least, most]: [i64; 2],
+    patch: &Patch,
+) -> impl Iterator<Item = Cell> {
+    let [mut low, mut high] = [f64::INFINITY, f64::NEG_INFINITY];
+    for [first, _] in patch {
+        (low, high) = (low.min(*first), high.max(*first));
+    }
     let spare = CLEAR * (high - low);
-    let [from, to] = [(low - spare) / period, (high + spare) / period];
-    (from.ceil() as i64..=to.floor() as i64).map(|k| k as f64 * period).collect()
+    // A value that is not a number gives none.
+    let [from, to] = [((low - spare) / TAU).ceil() as i64, ((high + spare) / TAU).floor() as i64];
+    let shifted = move |turns: i64| patch.map(|[a, b]| [a - TAU * turns as f64, b]);
+    (from.max(least)..=to.min(most)).filter_map(move |turns| {
+        judge(corner, size, &shifted(turns)).map(|aim| Cell { corner, aim, turns })
+    })
 }
 
-/// The cell, if the first component may be `goal` in it and the second one 0.
-fn judge(corner: State, size: [f64; 2], patch: &Patch, goal: f64) -> Option<Cell> {
-    let patch = patch.map(|[first, second]| [first - goal, second]);
+/// The zero of the linear part, if the field may vanish in the cell.
+fn judge(corner: State, size: [f64; 2], patch: &Patch) -> Option<State> {
     let [mut low, mut high] = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
     for value in patch.iter().flatten().zip([0, 1].into_iter().cycle()) {
         let (value, k) = value;
@@ -142,7 +150,7 @@ fn judge(corner: State, size: [f64; 2], patch: &Patch, goal: f64) -> Option<Cell
     let mean = 0.25 * (value(5) + value(6) + value(9) + value(10));
     let along = 0.5 * (value(6) + value(10) - value(5) - value(9));
     let up = 0.5 * (value(9) + value(10) - value(5) - value(6));
-    let unresolved = Some(Cell { corner, aim: centre, goal });
+    let unresolved = Some(centre);
     let Some(inverse) = Matrix2::from_columns(&[along, up]).try_inverse() else {
         return unresolved;
     };
@@ -160,31 +168,32 @@ fn judge(corner: State, size: [f64; 2], patch: &Patch, goal: f64) -> Option<Cell
         return unresolved;
     }
     // At most to the cell's edge: the linear part is unknown beyond.
-    let aim = [0, 1].map(|k| centre[k] - from_centre[k].clamp(-1.0, 1.0) * size[k]);
-    Some(Cell { corner, aim, goal })
+    Some([0, 1].map(|k| centre[k] - from_centre[k].clamp(-1.0, 1.0) * size[k]))
 }
 
 /// A start during the iteration.
 struct Iteration {
     first: State,
     point: State,
+    turns: i64,
     least: f64,
     best: State,
     begun_at: f64,
 }
 
-/// The points near zeros of the field that the starts reach within `reach`, each once.
+/// The points that the starts reach within `reach` near places at which the field is their number of turns, each once.
 ///
 /// # Errors
 /// Errors of `field`, which is evaluated at many points at once.
 pub(super) fn approach(
-    starts: &[State],
+    starts: &[(State, i64)],
     reach: f64,
     mut field: impl FnMut(&[State]) -> Result<Vec<State>, Error>,
 ) -> Result<Vec<State>, Error> {
-    let begun = |start: &State| Iteration {
+    let begun = |(start, turns): &(State, i64)| Iteration {
         first: *start,
         point: *start,
+        turns: *turns,
         least: f64::INFINITY,
         best: *start,
         begun_at: f64::INFINITY,
@@ -205,7 +214,8 @@ pub(super) fn approach(
         let values = field(&nodes)?;
         let mut on = Vec::new();
         for (mut w, values) in iterations.into_iter().zip(values.chunks_exact(3)) {
-            let [at, right, above] = [values[0], values[1], values[2]].map(Vector2::from);
+            let shift = Vector2::new(TAU * w.turns as f64, 0.0);
+            let [at, right, above] = [0, 1, 2].map(|k| Vector2::from(values[k]) - shift);
             let size = at.norm();
             if iteration == 0 {
                 w.begun_at = size;

@@ -1,4 +1,4 @@
-//! All periodic orbits of one period and winding in a box of starts, stable and unstable.
+//! All periodic orbits of one period and some windings in a box of starts, stable and unstable.
 //!
 //! Newton's method starts wherever the displacement `P^n(x) - x - (2 pi w, 0)`, angles not wrapped,
 //! may vanish (`multistart`). Next to an orbit near its bifurcation it starts again, deflated by
@@ -45,6 +45,9 @@ const CREEPS: f64 = 1e-3;
 /// two of them.
 const LOOKS: usize = 2000;
 const BISECTIONS: usize = 60;
+/// Starts of Newton's method at once, and the distance from an orbit at which they are on it.
+const BATCH: usize = 16;
+const ARRIVED: f64 = 1e-5;
 /// Orbits near another one are sought only if the derivative of the displacement shrinks a
 /// direction below this.
 const WEAK: f64 = 0.3;
@@ -58,8 +61,8 @@ const HALVINGS: u32 = 9;
 pub struct Request {
     /// Smallest period, in forcing periods.
     pub n: usize,
-    /// Net turns over it.
-    pub w: i64,
+    /// Net turns over it: the least and the most.
+    pub w: [i64; 2],
     /// Angles, rad.
     pub theta: Axis,
     /// Velocities.
@@ -79,7 +82,7 @@ pub struct Orbits {
     pub begun: usize,
 }
 
-/// The orbits of smallest period `n` and `w` net turns that have a point in the box.
+/// The orbits of smallest period `n` with these net turns that have a point in the box.
 ///
 /// States held by friction are excluded: they are a set.
 ///
@@ -95,12 +98,18 @@ pub fn orbits(pendulum: &Pendulum, request: &Request, control: &Control) -> Resu
     let cells = request.theta.count * request.velocity.count;
     memory::reckon("cells", cells, EACH)?;
     let none = Orbits { closed: Vec::new(), running: Vec::new(), begun: 0 };
-    if pendulum.is_autonomous() && (request.n, request.w) != (1, 0) {
+    let turns = request.w[0]..=request.w[1];
+    let mut running = Vec::new();
+    if pendulum.is_autonomous() {
         // Without turns a flow in the plane has closed orbits only if it is conservative, and then
         // everywhere.
-        let running = if request.n == 1 { running_states(pendulum) } else { Vec::new() };
-        let running = running.into_iter().filter(|r| r.sense == request.w).collect();
-        return Ok(Orbits { running, ..none });
+        if request.n == 1 {
+            running = running_states(pendulum);
+            running.retain(|r| turns.contains(&r.sense));
+        }
+        if request.n > 1 || !turns.contains(&0) {
+            return Ok(Orbits { running, ..none });
+        }
     }
     let map = PoincareMap::new(pendulum);
     let mirror = Mirror::of(pendulum);
@@ -121,23 +130,27 @@ pub fn orbits(pendulum: &Pendulum, request: &Request, control: &Control) -> Resu
     while !next.is_empty() {
         control.begin(next.len());
         begun += next.len();
-        let search = |start: &State| {
-            control.check()?;
-            let orbit = newton::find_other(&map, *start, request.n, reach, &known);
-            control.add(1);
-            Ok(orbit)
-        };
-        let found: Vec<Option<PeriodicOrbit>> =
-            pool.install(|| next.par_iter().map(search).collect::<Result<_, Error>>())?;
         let before = all.len();
-        for orbit in found.into_iter().flatten() {
-            if is_held(pendulum, &orbit) {
-                continue;
-            }
-            let image = mirror.as_ref().and_then(|m| Some(m.orbit(&map, &orbit)?.0));
-            for one in std::iter::once(orbit).chain(image) {
-                if !all.iter().any(|other| other.is_same(&one)) {
-                    all.push(one);
+        for some in next.chunks(BATCH) {
+            let search = |start: &State| {
+                control.check()?;
+                control.add(1);
+                // From a point of an orbit Newton's method finds that orbit.
+                let arrived = all.iter().any(|orbit| orbit.contains(*start, ARRIVED));
+                let find = || newton::find_other(&map, *start, request.n, reach, &known);
+                Ok(if arrived { None } else { find() })
+            };
+            let found: Vec<Option<PeriodicOrbit>> =
+                pool.install(|| some.par_iter().map(search).collect::<Result<_, Error>>())?;
+            for orbit in found.into_iter().flatten() {
+                if is_held(pendulum, &orbit) {
+                    continue;
+                }
+                let image = mirror.as_ref().and_then(|m| Some(m.orbit(&map, &orbit)?.0));
+                for one in std::iter::once(orbit).chain(image) {
+                    if !all.iter().any(|other| other.is_same(&one)) {
+                        all.push(one);
+                    }
                 }
             }
         }
@@ -150,10 +163,10 @@ pub fn orbits(pendulum: &Pendulum, request: &Request, control: &Control) -> Resu
         map.angle.turns().iter().any(within) && request.velocity.holds(p[1])
     };
     all.retain(|orbit| {
-        let asked = (orbit.n, orbit.w) == (request.n, request.w);
+        let asked = orbit.n == request.n && turns.contains(&orbit.w);
         asked && orbit.points.iter().any(inside)
     });
-    Ok(Orbits { closed: all, begun, ..none })
+    Ok(Orbits { closed: all, running, begun })
 }
 
 /// Whether friction holds the orbit. Newton's method leaves a velocity of the size of rounding, and creeps to the edge of
@@ -206,11 +219,11 @@ fn beginnings(
         let ends = ends.to_vec().into_iter().zip(turns);
         let gap = |(start, ([theta, velocity], turns)): (&State, (State, i64))| {
             let rest = strobe.angle.wrapped(theta - start[0]);
-            [(turns - request.w) as f64 * TAU + rest, velocity - start[1]]
+            [turns as f64 * TAU + rest, velocity - start[1]]
         };
         Ok(from.iter().zip(ends).map(gap).collect())
     };
-    let places = places([request.theta, request.velocity], None, MOST_CELLS, &displacements)?;
+    let places = places([request.theta, request.velocity], request.w, MOST_CELLS, &displacements)?;
     approach(&places, reach, displacements)
 }
 

@@ -1,12 +1,14 @@
 //! Bindings of branches of orbits along a parameter.
 
 use numpy::PyArray2;
+use pendmap::attractor::Kind;
 use pendmap::continuation::branch::Bounds;
 use pendmap::continuation::course::{Course, Law};
 use pendmap::continuation::cycle::{Closure, Orbit};
 use pendmap::continuation::event::Event;
+use pendmap::continuation::family::Branch;
 use pendmap::error::Error;
-use pendmap::maps::branches::{Branches as Found, Request, branches as search};
+use pendmap::maps::branches::{Branches as Found, Request, Sought, branches as search};
 use pendmap::model::Parameter;
 use pyo3::prelude::*;
 
@@ -14,6 +16,9 @@ use super::convert::{Array, array};
 use super::long_calls::interruptible;
 use super::model::Model;
 use super::raise;
+
+/// A velocity below this is rest.
+const STILL: f64 = 1e-9;
 
 /// Branches as columns: of the branches, of their orbits, of the points of those, and of what happens.
 #[pyclass(frozen, get_all, module = "pendmap._core")]
@@ -43,23 +48,28 @@ pub struct Continuation {
     event_orbit: Array<i32>,
     supercritical: Array<i32>,
     smooth: Vec<bool>,
+    /// Of each branch the kind of its orbits; of each region, where all were searched, its ends; its stable orbits, each
+    /// by region and branch.
+    kind: Vec<&'static str>,
+    regions: Vec<(f64, f64)>,
+    stable: Vec<(i32, i32)>,
     /// Coordinates at which orbits were searched, and how many were found.
     sections: Vec<(f64, usize)>,
 }
 
-/// All branches of orbits of period `n` and winding `w`, up to the period `longest`, along parameters: each with its
-/// values at places in the range, whose ends are the first and the last place. With `start`, an angle, a velocity and a
-/// coordinate, the one branch through the orbit that Newton's method finds from there.
+/// All branches of orbits of a period and a winding, or of all up to the period, and up to `longest` what is born there, along parameters: each with its
+/// values at places in the range, whose ends are the first and the last place. With `starts`, angles, velocities, periods and
+/// coordinates, the branches through the orbits that Newton's method finds from there.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)] // what Python passes, and the interpreter
-#[pyo3(signature = (model, along, winding, longest, start, threads, progress=None))]
+#[pyo3(signature = (model, along, sought, longest, starts, threads, progress=None))]
 pub fn continuation(
     py: Python<'_>,
     model: Model,
     along: (Vec<f64>, Vec<(String, Vec<f64>)>),
-    winding: (usize, i64),
+    sought: (usize, Option<i64>),
     longest: usize,
-    start: Option<(f64, f64, f64)>,
+    starts: Option<Vec<(f64, f64, usize, f64)>>,
     threads: usize,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Continuation> {
@@ -71,9 +81,15 @@ pub fn continuation(
     let axis = parameters.into_iter().map(one).collect::<Result<_, Error>>().map_err(raise)?;
     let [low, high] = [places.first(), places.last()].map(|end| end.copied().unwrap_or(f64::NAN));
     let course = Course::new(base, vec![axis]);
-    let (n, w) = winding;
-    let start = start.map(|(theta, velocity, at)| ([theta, velocity], at));
-    let request = Request { n, w, longest, start, threads };
+    let (n, w) = sought;
+    let sought = match (starts, w) {
+        (Some(starts), _) => {
+            Sought::Near(starts.into_iter().map(|(theta, v, n, at)| ([theta, v], n, at)).collect())
+        }
+        (None, Some(w)) => Sought::Type(n, w),
+        (None, None) => Sought::UpTo(n),
+    };
+    let request = Request { sought, longest, threads };
     let found = interruptible(py, progress.as_ref(), |control| {
         search(&course, Bounds { low, high }, &request, control)
     })?;
@@ -87,7 +103,7 @@ impl Continuation {
         let angle = family.course.base.angle();
         let whole = |numbers: Vec<usize>| numbers.into_iter().map(|x| x as i32).collect::<Vec<_>>();
         // Numbers of the first orbit and event of each branch.
-        let first = |count: fn(&pendmap::continuation::family::Branch) -> usize| {
+        let first = |count: fn(&Branch) -> usize| {
             let counts = all.iter().map(count);
             counts.scan(0, |sum, count| Some(std::mem::replace(sum, *sum + count))).collect()
         };
@@ -123,6 +139,22 @@ impl Continuation {
             .zip(&orbits)
             .flat_map(|(branch, first)| branch.run.events.iter().map(move |e| (first + e.orbit, e)))
             .collect();
+        let kind = |branch: &Branch| {
+            let cycles = family.cycles(branch.of);
+            let orbits = &branch.run.orbits;
+            let points = cycles.all_points(&orbits[orbits.len() / 2].place);
+            let still = points.iter().all(|point| point[1].abs() < STILL);
+            match (branch.of.w, still, points[0][0].cos() > 0.0) {
+                (0, true, true) => Kind::Rest,
+                (0, true, false) => Kind::InvertedRest,
+                (0, false, _) => Kind::Oscillation,
+                _ => Kind::Rotation,
+            }
+        };
+        let stable = found.regions.iter().enumerate();
+        let stable = stable.flat_map(|(k, region)| {
+            region.stable.iter().map(move |branch| (k as i32, *branch as i32))
+        });
         let sign = |known: Option<bool>| known.map_or(-1, i32::from);
         Ok(Self {
             n: array(py, whole(all.iter().map(|branch| branch.of.n).collect())),
@@ -144,6 +176,9 @@ impl Continuation {
             event_orbit: array(py, whole(happens.iter().map(|(orbit, _)| *orbit).collect())),
             supercritical: array(py, happens.iter().map(|(_, e)| sign(e.supercritical)).collect()),
             smooth: happens.iter().map(|(_, event)| event.smooth).collect(),
+            kind: all.iter().map(|branch| kind(branch).word()).collect(),
+            regions: found.regions.iter().map(|region| (region.from, region.to)).collect(),
+            stable: stable.collect(),
             sections: found.sections.clone(),
         })
     }

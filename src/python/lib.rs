@@ -11,6 +11,7 @@ mod fit;
 mod library;
 mod long_calls;
 mod maps;
+mod matching;
 mod model;
 mod motion;
 mod orbits;
@@ -115,6 +116,7 @@ mod _core {
         kinds,
         library::{effects, formula, roles},
         maps::{BasinPlan, LabelledStarts, Reliability, Texture, TextureSum, Uncertainty, thinned},
+        matching::{distance, matched, numbered},
         motion::{Trajectory, acceleration, advance, choose_steps, rates, simulate},
         orbits::{Orbit, OrbitSearch, orbits, orbits_near},
         parameter_maps::{Bifurcation, Followed, ParameterMap, parameter_names},

@@ -1,8 +1,14 @@
 //! Bindings of periodic orbits.
 
+use std::sync::atomic::AtomicBool;
+
 use pendmap::attractor;
 use pendmap::attractor::catalogue::arrange;
-use pendmap::integrate::Strobe;
+use pendmap::continuation::branch::Bounds;
+use pendmap::continuation::course::{Course, Law};
+use pendmap::continuation::family::Family;
+use pendmap::error::Error;
+use pendmap::integrate::{State, Strobe};
 use pendmap::lanes::InstructionSet;
 use pendmap::maps::orbits::{Request, orbits as search};
 use pendmap::orbit::symmetry::Mirror;
@@ -48,7 +54,7 @@ pub fn orbits(
 ) -> PyResult<OrbitSearch> {
     let pendulum = model.pendulum()?;
     let [theta, velocity] = axes(theta, velocity)?;
-    let request = Request { n: winding.0, w: winding.1, theta, velocity, threads };
+    let request = Request { n: winding.0, w: [winding.1; 2], theta, velocity, threads };
     let found =
         interruptible(py, progress.as_ref(), |control| search(&pendulum, &request, control))?;
     let closed = found.closed.iter().map(|orbit| attractor::Attractor::periodic(&pendulum, orbit));
@@ -76,28 +82,47 @@ const REACH: f64 = 0.3;
 /// Turns, points of a periodic orbit.
 type Near = (i64, Vec<(f64, f64)>);
 
-/// The periodic orbits that continue orbits of a similar model, each given by a state of it, its period n and whether
-/// it is its own mirror image (none where that has no meaning). None where Newton's method finds no orbit of
-/// that period, or one of another symmetry or on the other side ([`Mirror::continues`]). They are orbits of `steps`
-/// integration steps a period, with their error.
+/// The periodic orbits at the end of a line in the space of parameters, each with its two values, that continue orbits at
+/// its beginning, each given by a state of it, its period n and whether it is its own mirror image (none where that has
+/// no meaning). Where Newton's method finds no orbit of that period from there, or one of another symmetry or on
+/// the other side ([`Mirror::continues`]), the branch is followed; none where it turns back or ends. They are orbits of
+/// `steps` integration steps a period, with their error.
 #[pyfunction]
 pub fn orbits_near(
     py: Python<'_>,
     model: Model,
+    along: Vec<(String, f64, f64)>,
     steps: usize,
     states: Vec<(f64, f64, usize, Option<bool>)>,
 ) -> PyResult<Vec<Option<Near>>> {
-    let pendulum = model.pendulum()?;
+    let base = model.pendulum()?;
+    let law = |(name, from, to): (String, f64, f64)| {
+        Ok((base.parameter(&name)?, Law::Quadratic([from, to - from, 0.0])))
+    };
+    let axis = along.into_iter().map(law).collect::<Result<_, Error>>().map_err(raise)?;
+    let course = Course::new(base, vec![axis]);
     let simd = InstructionSet::choose().map_err(raise)?;
     Ok(py.detach(|| {
+        let pendulum = course.pendulum(&[1.0]);
         let map = PoincareMap::of_steps(&Strobe::new(&pendulum, steps, simd));
         let mirror = Mirror::of(&pendulum);
+        let bounds = Bounds { low: 0.0, high: 1.0 };
+        let carried = |start: State, n: usize| {
+            let before =
+                newton::find(&PoincareMap::new(&course.pendulum(&[0.0])), start, n, REACH)?;
+            let family = Family::new(course.clone(), bounds, n).ok()?;
+            family.carried(&before, &AtomicBool::new(false))
+        };
         let near = |&(theta, velocity, n, symmetric): &(f64, f64, usize, Option<bool>)| {
+            let from = |start: State| {
+                let orbit = newton::find(&map, start, n, REACH).filter(|o| o.n == n)?;
+                let continues =
+                    mirror.as_ref().is_none_or(|m| m.continues(&orbit, start, symmetric));
+                let points = || orbit.points.iter().map(|p| (p[0], p[1])).collect();
+                continues.then(|| (orbit.w, points()))
+            };
             let start = [theta, velocity];
-            let orbit = newton::find(&map, start, n, REACH).filter(|o| o.n == n)?;
-            let continues = mirror.as_ref().is_none_or(|m| m.continues(&orbit, start, symmetric));
-            let points = || orbit.points.iter().map(|p| (p[0], p[1])).collect();
-            continues.then(|| (orbit.w, points()))
+            from(start).or_else(|| from(carried(start, n)?))
         };
         states.iter().map(near).collect()
     }))

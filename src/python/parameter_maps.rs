@@ -7,6 +7,7 @@ use pendmap::integrate::State;
 use pendmap::lanes::InstructionSet;
 use pendmap::maps::bifurcation as diagram;
 use pendmap::maps::cell::Found;
+use pendmap::maps::matching;
 use pendmap::maps::parameter_map as maps;
 use pendmap::model::Angle;
 use pyo3::prelude::*;
@@ -49,6 +50,8 @@ pub struct ParameterMap {
 /// The attractors along one parameter, their points, and the motions followed up and down.
 #[pyclass(frozen, get_all, extends = ParameterMap, module = "pendmap._core")]
 pub struct Bifurcation {
+    /// The branch of each attractor.
+    branch: Array<i32>,
     /// The attractor of each point.
     point_entry: Array<i32>,
     point_theta: Array<f64>,
@@ -112,7 +115,9 @@ impl Bifurcation {
             .flat_map(|(i, f)| f.attractor.points.iter().map(move |point| (i as i32, *point)))
             .collect();
         let (point_entry, point_theta, point_velocity) = columns(py, &points);
+        let branch = matching::linked(&found.map).into_iter().map(|k| k as i32).collect();
         let own = Self {
+            branch: array(py, branch),
             point_entry,
             point_theta,
             point_velocity,

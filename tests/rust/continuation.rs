@@ -11,7 +11,7 @@ use pendmap::continuation::period::Period;
 use pendmap::error::Error;
 use pendmap::integrate::reference::event::EventKind;
 use pendmap::integrate::trajectory::{Request as Trajectory, simulate};
-use pendmap::maps::branches::{Branches, Request, branches};
+use pendmap::maps::branches::{Branches, Request, Sought, branches};
 use pendmap::maps::control::Control;
 use pendmap::model::{Effect, Formula, Kind, Parameter, Pendulum};
 use pendmap::orbit::PoincareMap;
@@ -27,7 +27,7 @@ fn along_p(base: &Pendulum, range: [f64; 2], winding: (usize, i64), longest: usi
 }
 
 fn along(course: &Course, [low, high]: [f64; 2], (n, w): (usize, i64), longest: usize) -> Branches {
-    let request = Request { n, w, longest, start: None, threads: 0 };
+    let request = Request { sought: Sought::Type(n, w), longest, threads: 0 };
     branches(course, Bounds { low, high }, &request, &Control::default()).expect("branches")
 }
 
@@ -91,10 +91,11 @@ fn symmetric_oscillations_break_once_and_fold_once() {
     // By scipy: where the half map of the symmetric orbit has the multiplier -1.
     assert_near(&events(&found, 2, Happens::SymmetryBreaking), &[1.258943005924], 1e-10);
     let branches = &found.family.branches;
-    assert_eq!(branches.len(), 3, "the symmetric one and a pair of twins");
+    assert_eq!(branches.len(), 4, "the symmetric one, rest that it is born of, a pair of twins");
     assert!(branches[0].ends.contains(&End::Rest) && branches[0].run.events.len() == 1);
-    assert_eq!([branches[1].twin, branches[2].twin], [Some(2), Some(1)]);
-    assert_eq!(branches[1].meets[0], Some((0, 0)));
+    assert_eq!(branches[1].of.closure, Closure::Rest);
+    assert_eq!([branches[2].twin, branches[3].twin], [Some(3), Some(2)]);
+    assert_eq!(branches[2].meets[0], Some((0, 0)));
     assert_eq!(branches[0].run.events[0].supercritical, Some(true));
     let found = along_p(&driven(0.1, 1.0, 1.8), [0.15, 0.8], (2, 0), 2);
     assert_near(&events(&found, 2, Happens::Fold), &[0.210425102330], 1e-10);
@@ -161,8 +162,8 @@ fn rest_swallows_a_stick_slip_motion() {
     let asked = Trajectory { start: [0.0; 2], until, tol: 1e-10, samples: 16, lyapunov: false };
     let run = simulate(&base, &asked, &AtomicBool::new(false)).expect("a motion");
     let last = run.theta.len() - 1;
-    let start = Some(([run.theta[last], run.velocity[last]], 0.6));
-    let request = Request { n: 1, w: 0, longest: 1, start, threads: 1 };
+    let start = ([run.theta[last], run.velocity[last]], 1, 0.6);
+    let request = Request { sought: Sought::Near(vec![start]), longest: 1, threads: 1 };
     let bounds = Bounds { low: 0.2, high: 0.7 };
     let found = branches(&course, bounds, &request, &Control::default()).expect("a branch");
     assert!(found.family.branches[0].ends.contains(&End::Sticks));
@@ -339,14 +340,43 @@ fn a_direct_drive_has_symmetric_orbits_of_odd_period() {
 #[test]
 fn negative_damping_sheds_a_torus() {
     let spec = formula("pump", "b*v - c*v^3", &[("b", 1.0), ("c", -1.0)]);
-    let pump = Effect::new(Kind::Formula(Formula::new(&spec).expect("a formula")), &[0.1, 0.5])
-        .expect("in range");
-    let base = driven(0.2, 0.05, 1.3).with_effect(pump).expect("once");
-    let course = Course::of(&base, base.parameter("pump.b").expect("there"));
-    let found = along(&course, [0.1, 0.3], (1, 0), 1);
-    let all: Vec<f64> = events(&found, 1, Happens::NeimarkSacker);
-    // Rest, hanging: the damping is none where the effect feeds what gamma takes.
-    assert_near(&all, &[0.2], 1e-10);
+    // Growing damping limits the motion that grows; falling damping frees it.
+    for (c, supercritical) in [(0.5, true), (-0.5, false)] {
+        let pump = Effect::new(Kind::Formula(Formula::new(&spec).expect("a formula")), &[0.1, c]);
+        let base = driven(0.2, 0.05, 1.3).with_effect(pump.expect("in range")).expect("once");
+        let course = Course::of(&base, base.parameter("pump.b").expect("there"));
+        let start = Sought::Near(vec![([0.0; 2], 1, 0.15)]);
+        let request = Request { sought: start, longest: 1, threads: 1 };
+        let bounds = Bounds { low: 0.1, high: 0.3 };
+        let found = branches(&course, bounds, &request, &Control::default()).expect("rest");
+        let all: Vec<f64> = events(&found, 1, Happens::NeimarkSacker);
+        // Rest, hanging: the damping is none where the effect feeds what gamma takes.
+        assert_near(&all, &[0.2], 1e-10);
+        let events = found.family.branches.iter().flat_map(|branch| &branch.run.events);
+        let sheds = events.filter(|event| event.kind == Happens::NeimarkSacker);
+        assert!(sheds.map(|event| event.supercritical).all(|side| side == Some(supercritical)));
+    }
+}
+
+#[test]
+fn all_types_to_a_period_are_followed_with_their_parents() {
+    let course = Course::of(&driven(0.1, 1.0, 2.0), Parameter::P);
+    let bounds = Bounds { low: 0.3, high: 1.6 };
+    let request = Request { sought: Sought::UpTo(2), longest: 2, threads: 0 };
+    let all = branches(&course, bounds, &request, &Control::default()).expect("branches").family;
+    let of = |n, w| all.branches.iter().filter(move |b| (b.of.n, b.of.w) == (n, w)).count();
+    // Both rests; the rotation, its double and its mirror image; the oscillation and its twins.
+    assert_eq!([of(1, 0), of(1, 1), of(1, -1), of(2, 2), of(2, 0), of(2, 1)], [2, 1, 1, 1, 3, 1]);
+    for branch in &all.branches {
+        for (end, meets) in branch.ends.iter().zip(branch.meets) {
+            assert_eq!(meets.is_some(), matches!(end, End::Rest | End::Parent));
+        }
+    }
+    // The double alone was searched: the rotation that it is born of is followed.
+    let found = along(&course, [1.3, 1.6], (2, 2), 2).family;
+    let types: Vec<_> = found.branches.iter().map(|branch| (branch.of.n, branch.of.w)).collect();
+    assert_eq!(types, [(2, 2), (1, 1)]);
+    assert_eq!(found.branches[0].meets.iter().flatten().count(), 1);
 }
 
 #[test]
@@ -354,15 +384,15 @@ fn a_start_gives_the_one_branch_through_its_orbit() {
     let base = driven(0.1, 0.6, 2.0);
     let course = Course::of(&base, Parameter::P);
     let start = [-0.9637656868217229, 2.4287080359130084];
-    let request = Request { n: 1, w: 1, longest: 1, start: Some((start, 0.6)), threads: 1 };
+    let near = |start| Request { sought: Sought::Near(vec![start]), longest: 1, threads: 1 };
     let bounds = Bounds { low: 0.3, high: 1.0 };
-    let found = branches(&course, bounds, &request, &Control::default()).expect("a branch");
+    let found = branches(&course, bounds, &near((start, 1, 0.6)), &Control::default());
+    let found = found.expect("a branch");
     assert_eq!(found.family.branches.len(), 1);
     assert!(found.sections.is_empty());
     let orbit = find(&PoincareMap::new(&base), start, 1, 0.3).expect("an orbit");
     assert!(found.family.passes(&orbit, 0.6));
-    let nowhere = Request { start: Some(([0.3, 9.0], 0.6)), ..request };
-    let refused = branches(&course, bounds, &nowhere, &Control::default());
+    let refused = branches(&course, bounds, &near(([0.3, 9.0], 1, 0.6)), &Control::default());
     assert!(matches!(refused, Err(Error::NoOrbit { .. })));
 }
 

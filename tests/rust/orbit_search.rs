@@ -19,7 +19,7 @@ use crate::truths::{attractors, list, number, truths};
 fn request(n: usize, w: i64, cells: usize) -> Request {
     Request {
         n,
-        w,
+        w: [w; 2],
         theta: Axis::new("theta", -PI, PI, cells).expect("an axis"),
         velocity: Axis::new("velocity", -4.0, 4.0, cells).expect("an axis"),
         threads: 0,

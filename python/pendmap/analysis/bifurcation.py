@@ -2,38 +2,36 @@
 
 from __future__ import annotations
 
-import itertools
-import math
+import contextlib
 from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 import xarray as xr
 
-from pendmap.analysis import cell_search, result, varied
-from pendmap.analysis.matching import matched, numbered
+from pendmap import _core
+from pendmap.analysis import cell_search, continuation, result, varied
 from pendmap.analysis.orbit_table import attractors_of
 from pendmap.analysis.result import Field, Schema, point, rows
 from pendmap.analysis.run import Numerics, RunOptions
-from pendmap.errors import InputError, check_number, short_repr
+from pendmap.errors import InputError, check_whole, core_errors
 from pendmap.files.variables import variable
 from pendmap.formatting import counted, span
+from pendmap.model import without_dimensions
 from pendmap.units import VELOCITY
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
-    from pendmap import _core
     from pendmap.analysis.grid import Grid
     from pendmap.analysis.run import Keywords
     from pendmap.analysis.varied import Varied
     from pendmap.model import Pendulum, Rig
-    from pendmap.signal import Floats
     from pendmap.units import Units
 
 
-_NEAR = 0.3  # Distance, rad and units of velocity, below which neighbours may be one branch
+_OF = "followed_"  # Beginning of the names of variables and dimensions of followed branches
 _LISTED = 12  # Largest number of branches in a summary
 
 
@@ -48,11 +46,24 @@ def _branches(dataset: xr.Dataset) -> list[dict[str, Any]]:
     return branches
 
 
+def followed(dataset: xr.Dataset) -> xr.Dataset:
+    """Return the followed branches of its orbits with the names of a continuation, if any."""
+    names = {name: str(name).removeprefix(_OF) for name in dataset if str(name).startswith(_OF)}
+    sizes = {dim: str(dim).removeprefix(_OF) for dim in dataset.sizes if str(dim).startswith(_OF)}
+    return dataset[[*names]].reset_coords(drop=True).rename(names | sizes)
+
+
 SCHEMA = Schema(
     "bifurcation",
     result.UNITS,
     Field("varied", "", "parameter that varies"),
     Field("branches", "", "attractors followed along the parameter", read=_branches),
+    Field(
+        "events",
+        "",
+        "folds, doublings and other events of its orbits",
+        read=lambda one: continuation.events(followed(one)),
+    ),
     Field("points", "1", "stroboscopic points"),
     *cell_search.SEARCH,
 )
@@ -63,6 +74,7 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     ranges: Mapping[str, ArrayLike],
     *,
     start: tuple[float, float] | None = None,
+    branches: int = 0,
     starts: int = 9,
     box: Grid | None = None,
     tol: float = 1e-6,
@@ -79,6 +91,9 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     smallest exponent there needs to shrink what decays to exp(-200). Where the two differ there is
     hysteresis, unless they differ at all values because each stays where it begins.
 
+    With ``branches`` those of its orbits are followed as by :func:`pendmap.continuation`, unstable
+    parts too, with their folds, doublings and other events.
+
     Attractors at neighbouring values with the same kind, period and winding and with points near
     one another make a branch. At a bifurcation one branch ends and others begin.
 
@@ -91,6 +106,8 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     start : (float, float), optional
         Angle and velocity from which both sweeps start; by default each on the attractor that most
         starts end on there.
+    branches : int
+        Longest period of the orbits whose branches are followed, unstable parts too; 0: none.
     starts, box, tol, max_periods
         As for :func:`pendmap.parameter_map`.
     run : RunOptions, optional
@@ -105,7 +122,8 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
         the parameter as for that function; branches over ``branch``: ``branch_kind``,
         ``branch_w``, ``branch_first``, ``branch_last``; ``up`` and ``down`` over the parameter: the
         entry that the sweep is on, -1 where that is none of them; its points there, if any, over
-        ``loose``.
+        ``loose``; followed branches as for :func:`pendmap.continuation`, each name after
+        ``followed_``.
 
     Raises
     ------
@@ -125,23 +143,26 @@ def bifurcation(  # noqa: PLR0913 (physics first, numerical choices by name)
     (axis,) = varied.varied(pendulum, ranges, 1)
     units, first = pendulum.units, None
     if start is not None:
-        if np.asarray(start, dtype=object).shape != (2,):
-            raise InputError(f"start must be (angle, velocity), got {short_repr(start)}")
-        angle, speed = (check_number("start", part) for part in start)
+        angle, speed = continuation.state("start", start)
         first = (angle, units.bare(speed, VELOCITY))
     numerics = Numerics(RunOptions.of(run, options), tol, max_periods)
+    longest = check_whole("branches", branches, 0, continuation.LONGEST)
+    workers = numerics.run.workers
     search = cell_search.CellSearch(pendulum, (axis,), starts, box, numerics)
 
     def make(survey: _core.Survey, blocks: list[bytes]) -> cell_search.Made:
         raw = survey.diagram(blocks, first)
         dataset = _dataset(raw, axis, units)
+        if longest:
+            with contextlib.suppress(InputError):  # no orbit, or no law of the parameters
+                dataset = dataset.assign(_followed(pendulum, dataset, axis, longest, workers))
         return raw, dataset, {"varied": axis.name, "points": dataset.sizes["point"]}
 
-    return search.result(SCHEMA, make, _summary, {"start": start})
+    return search.result(SCHEMA, make, _summary, {"start": start, "branches": longest})
 
 
 def _dataset(raw: _core.Bifurcation, axis: Varied, units: Units) -> xr.Dataset:
-    branch, owner, value = _linked(raw, axis.values.size), raw.point_entry, axis.values[raw.cell]
+    branch, owner, value = raw.branch, raw.point_entry, axis.values[raw.cell]
     speed = units.given(raw.point_velocity, VELOCITY)
     _, first = np.unique(branch, return_index=True)
     last = branch.size - 1 - np.unique(branch[::-1], return_index=True)[1]
@@ -177,6 +198,28 @@ def _dataset(raw: _core.Bifurcation, axis: Varied, units: Units) -> xr.Dataset:
     return xr.Dataset(data, coords=axis.coordinates)
 
 
+def _followed(
+    model: Pendulum | Rig, dataset: xr.Dataset, axis: Varied, longest: int, workers: int
+) -> Mapping[Any, Any]:
+    """Return the branches of its orbits, followed from the middle of each, with unstable parts."""
+    bare, units = without_dimensions(model)
+    names = ("theta", "velocity", "n", "value", "branch", "kind")
+    kinds, starts = dataset["kind"].values.tolist(), dict[int, list[Any]]()
+    for theta, v, n, value, branch, kind in rows(dataset, *(f"entry_{name}" for name in names)):
+        held = bare.theta_r > 0 and "rest" in kinds[kind]
+        if 1 <= n <= longest and not held:
+            speed = float(units.bare(v, VELOCITY))
+            starts.setdefault(branch, []).append((theta, speed, n, value))
+    middles = [entries[len(entries) // 2] for entries in starts.values()]
+    if not middles or (np.diff(axis.values) <= 0).any():
+        return {}
+    along = axis.values.tolist(), axis.kernel
+    with core_errors():
+        raw = _core.continuation(bare, along, (1, None), longest, middles, workers)
+    columns = continuation.columns(raw, axis, units)
+    return columns.rename({k: f"{_OF}{k}" for k in [*columns, *columns.sizes]}).variables
+
+
 def _summary(dataset: xr.Dataset) -> list[str]:
     name, count = dataset.attrs["varied"], dataset.sizes["branch"]
     values = dataset[name].values
@@ -191,51 +234,12 @@ def _summary(dataset: xr.Dataset) -> list[str]:
         lines.append(f"{kind}: {name} = {first[k]:.6g} to {last[k]:.6g}.")
     if count > _LISTED:
         lines.append(f"{count - _LISTED} shorter branches are in the result.")
-    return [*lines, *_hysteresis(dataset, values)]
-
-
-def _hysteresis(dataset: xr.Dataset, values: Floats) -> list[str]:
-    """Return summary lines on the values at which the sweeps are on different attractors."""
-    up, down, name = dataset["up"].values, dataset["down"].values, dataset.attrs["varied"]
-    every, kind = attractors_of(dataset, "kind_"), dataset["entry_kind"].values
-    pair, single = (
-        np.array([getattr(one, key) for one in every], dtype=str)[kind] for key in ("pair", "name")
-    )
-    arrived = (up >= 0) & (down >= 0)
-    differ = arrived & (pair[up] != pair[down])
-    images = arrived & ~differ & (single[up] != single[down])
-    others = arrived & ~differ & ~images & (up != down)
-    hysteresis = "" if differ[arrived].all() else ", with hysteresis,"
-    lines = []
-    for marked, text in (
-        (differ, f"on different kinds of attractor{hysteresis}"),
-        (images, "on mirror images of one another"),
-        (others, "on different attractors of one kind"),
-        (~arrived, "not both on an attractor"),
-    ):
-        if marked.any():
-            ends = span(name, *values[np.flatnonzero(marked)[[0, -1]]])
-            some = "" if marked.all() else f", {counted(int(marked.sum()), 'value')}"
-            lines.append(f"Up and down are {text} at {ends}{some}.")
-    return lines or ["Up and down are on the same attractors everywhere."]
-
-
-def _linked(raw: _core.Bifurcation, values: int) -> NDArray[np.int32]:
-    """Return the branch of each entry: near orbits, and chaos of one kind, with equal turns."""
-    bounds = np.searchsorted(raw.cell, np.arange(values + 1))
-    plane = np.stack([raw.point_theta, raw.point_velocity], axis=1)
-    points = np.split(plane, np.searchsorted(raw.point_entry, np.arange(1, raw.cell.size)))
-    kind = [raw.kinds[k].kind for k in raw.kind.tolist()]
-    key = list(zip(kind, raw.n.tolist(), raw.w.tolist(), strict=True))
-    links = []
-    for value, (begin, low, high) in enumerate(zip(bounds, bounds[1:], bounds[2:], strict=False)):
-
-        def reach(a: int, b: int, begin: int = begin, low: int = low) -> float:
-            if key[begin + a] != key[low + b]:
-                return 0.0
-            return _NEAR if raw.n[low + b] else math.inf
-
-        pairs = matched(points[begin:low], points[low:high], reach)
-        links += [((value, a), (value + 1, b)) for _, _, a, b in pairs]
-    branches = numbered(dict(enumerate(np.diff(bounds).tolist())), links)
-    return np.array([*itertools.chain(*branches.values())], dtype=np.int32)
+    pairs = np.array([one.pair for one in attractors_of(dataset, "kind_")], dtype=object)
+    on = [dataset[key].values for key in ("up", "down")]
+    up, down = (np.append(pairs[dataset["entry_kind"].values], "")[sweep] for sweep in on)
+    arrived = np.minimum(*on) >= 0
+    differ = np.flatnonzero(arrived & (up != down))
+    if 0 < differ.size < arrived.sum():  # otherwise each stays where it begins
+        where, some = span(name, *values[differ[[0, -1]]]), counted(differ.size, "value")
+        lines.append(f"Hysteresis: up and down differ at {where}, {some}.")
+    return lines

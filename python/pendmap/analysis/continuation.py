@@ -38,11 +38,12 @@ if TYPE_CHECKING:
 
 
 LONGEST: Final = 64  # Longest period of an orbit, in forcing periods
+MOST: Final = 16  # Longest period up to which all orbits are followed
 _PLACES: Final = 33  # Values along a range, from which the core knows how parameters depend on it
 _LISTED: Final = 16  # Largest number of events in a summary
 
 
-def _events(dataset: xr.Dataset) -> list[dict[str, Any]]:
+def events(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the events for the JSON object."""
     if "event_kind" not in dataset:
         return []
@@ -60,27 +61,43 @@ def _branches(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the branches for the JSON object."""
     if "branch_n" not in dataset:
         return []
-    names = ("n", "w", "symmetric", "begin", "end", "first", "last", "low", "high", "twin")
-    entries = result.records(dataset, **{name: f"branch_{name}" for name in names})
+    keys = "n w kind symmetric begin end first last low high twin begin_event end_event"
+    entries = result.records(dataset, **{name: f"branch_{name}" for name in keys.split()})
     for entry in entries:
         entry["symmetric"] = bool(entry["symmetric"])
         entry["ends"] = [entry.pop("begin"), entry.pop("end")]
         entry["from"], entry["to"] = entry.pop("first"), entry.pop("last")
+        entry["events"] = [result.none_below_0(entry.pop(f"{at}_event")) for at in ("begin", "end")]
         entry["twin"] = result.none_below_0(entry["twin"])
     return entries
+
+
+def regions(dataset: xr.Dataset) -> list[dict[str, Any]]:
+    """Return the regions between events for the JSON object, with their stable orbits."""
+    if "region_from" not in dataset:
+        return []
+    names = {"from": "region_from", "to": "region_to"}
+    every: list[dict[str, Any]] = [one | {"stable": []} for one in result.records(dataset, **names)]
+    kinds = list(rows(dataset, "branch_kind", "branch_n", "branch_w"))
+    for region, branch in rows(dataset, "stable_region", "stable_branch"):
+        kind, n, w = kinds[branch]
+        name = _core.Attractor(kind, n, w).name
+        every[region]["stable"].append({"name": name, "n": n, "w": w, "branch": branch})
+    return every
 
 
 SCHEMA = Schema(
     "continuation",
     result.UNITS,
     Field("varied", "", "parameter that varies"),
-    Field("events", "", "folds, doublings and other events of the branches", read=_events),
+    Field("events", "", "folds, doublings and other events of the branches", read=events),
     Field("branches", "", "branches of orbits", read=_branches),
+    Field("regions", "", "regions between events, with their stable orbits", read=regions),
     Field("curves", "", "curves in the plane of two parameters", read=curves.entries),
     Field("points", "", "points of codimension 2 on them", read=curves.points),
-    Field("up_to", "periods", "longest period of the orbits of curves"),
     Field("n", "periods", "smallest period of the orbits searched"),
     Field("w", "turns", "net turns over it"),
+    Field("up_to", "periods", "longest period of the orbits searched, of all types"),
     Field("longest", "periods", "longest period of branches begun at doublings"),
     Field("start", "", "angle and velocity where one branch was begun", None, json=False),
     Field("low", "", "lower end of the range, or of both"),
@@ -96,12 +113,12 @@ SCHEMA = Schema(
 def continuation(  # noqa: PLR0913 (physics first, numerical choices by name)
     pendulum: Pendulum | Rig,
     ranges: Mapping[str, ArrayLike],
-    n: int = 1,
-    w: int = 0,
+    n: int | None = None,
+    w: int | None = None,
     *,
     start: tuple[float, float] | None = None,
-    longest: int = 32,
-    up_to: int = 4,
+    up_to: int | None = None,
+    longest: int | None = None,
     run: RunOptions | None = None,
     **options: Unpack[Keywords],
 ) -> xr.Dataset:
@@ -127,35 +144,41 @@ def continuation(  # noqa: PLR0913 (physics first, numerical choices by name)
     ranges : mapping of str to (float, float) or array_like
         One parameter, or two, and the ends of their ranges; several with arrays are a curve. Names
         are those of :func:`pendmap.parameter_map`.
-    n : int
-        Smallest period of the orbits, in forcing periods; 1 to 64.
-    w : int
-        Net turns over that period, forward positive.
+    n : int, optional
+        Smallest period of the orbits, in forcing periods; 1 to 64, by default 1.
+    w : int, optional
+        Net turns over that period, forward positive; by default 0.
     start : (float, float), optional
         Angle and velocity from which Newton's method finds the one orbit that is followed, at the
         model's own value of the parameter; by default all orbits are searched.
-    longest : int
-        Longest period of the branches that are begun at doublings, in forcing periods.
-    up_to : int
-        With two parameters, the longest period of the orbits, in forcing periods; 1 to 16.
+    up_to : int, optional
+        Longest period of the orbits, in forcing periods; 1 to 16: all types are followed, instead
+        of one, with the mirror images of rotations. With two parameters by default 4.
+    longest : int, optional
+        Longest period of the branches that are begun at doublings, in forcing periods; by default
+        32, or ``up_to``.
     run : RunOptions, optional
         As for :func:`pendmap.basins`.
 
     Returns
     -------
     xarray.Dataset
-        Branches over ``branch``: ``branch_n``, ``branch_w``, ``branch_symmetric``, ``branch_begin``
-        and ``branch_end`` (why it ends), ``branch_first`` and ``branch_last`` (the values there),
-        ``branch_low`` and ``branch_high``, ``branch_begin_event`` and ``branch_end_event`` (the
-        event that it meets another branch at), ``branch_twin``. Their orbits over ``orbit``:
-        ``orbit_value``, ``orbit_branch``, ``orbit_multipliers``, ``orbit_stable``,
-        ``orbit_phases`` (under friction: + - slips, 0 sticks), ``orbit_amplitude`` (half the angle
-        between its outermost turns; nan of rotations), ``orbit_swings``; all points over ``point``.
-        Along a frequency, the ``backbone_amplitude`` of free swings over ``backbone_value``, their
-        rate: orbits of ``k`` swings in ``n`` periods lie near ``n/k`` times it. Events
-        over ``event``: ``event_kind``, ``event_value``, ``event_theta``, ``event_velocity``,
+        Branches over ``branch``: ``branch_n``, ``branch_w``, ``branch_kind``,
+        ``branch_symmetric``, ``branch_begin`` and ``branch_end`` (why it ends), ``branch_first``
+        and ``branch_last`` (the values there), ``branch_low`` and ``branch_high``,
+        ``branch_begin_event`` and ``branch_end_event`` (the event that it meets another branch at),
+        ``branch_twin``. Their orbits over ``orbit``: ``orbit_value``, ``orbit_branch``,
+        ``orbit_multipliers``, ``orbit_stable``, ``orbit_phases`` (under friction: + - slips, 0
+        sticks), ``orbit_amplitude`` (half the angle between its outermost turns; nan of rotations),
+        ``orbit_swings``; all points over ``point``. Along a frequency, the ``backbone_amplitude``
+        of free swings over ``backbone_value``, their rate: orbits of ``k`` swings in ``n`` periods
+        lie near ``n/k`` times it. Events over ``event``: ``event_kind``, ``event_value``,
+        ``event_theta``, ``event_velocity``,
         ``event_n``, ``event_w``, ``event_multipliers``, ``event_supercritical``, ``event_smooth``,
-        ``event_branch``, ``event_orbit``. Sections searched over ``section``.
+        ``event_branch``, ``event_orbit``. Sections searched over ``section``. With ``up_to``, the
+        regions in which the same orbits up to that period are stable, over ``region``:
+        ``region_from``, ``region_to``; these orbits over ``stable``: ``stable_region``,
+        ``stable_branch``. What friction holds is not among them.
 
         Of two parameters, curves over ``curve``: ``curve_kind``, ``curve_n``, ``curve_w``,
         ``curve_symmetric``, ``curve_begin``, ``curve_end``; their points over ``place``:
@@ -186,7 +209,7 @@ def continuation(  # noqa: PLR0913 (physics first, numerical choices by name)
         pairs = {k: (*x[:2], _PLACES) if isinstance(x, tuple) else x for k, x in ranges.items()}
         axes = varied.varied(pendulum, pairs, 2)
         numerics = Numerics(RunOptions.of(run, options).in_memory("continuation"))
-        dataset, request = curves.in_plane(pendulum, axes, up_to, numerics)
+        dataset, request = curves.in_plane(pendulum, axes, 4 if up_to is None else up_to, numerics)
         known = numerics.provenance() | request
         say, what = curves.summary, "curves are"
         varied.complete(SCHEMA, dataset, pendulum, axes, known, summary=say, what=what)
@@ -195,19 +218,25 @@ def continuation(  # noqa: PLR0913 (physics first, numerical choices by name)
     pendulum = varied.having(pendulum, ranges)
     (axis,) = varied.varied(pendulum, ranges, 1)
     bare, units = without_dimensions(pendulum)
-    n = check_whole("n", n, 1, LONGEST)
-    w = check_whole("w", w, -MOST_CELLS, MOST_CELLS)
-    longest = check_whole("longest", longest, 1, LONGEST)
+    asked: dict[str, Any] = {}
+    if up_to is None:
+        asked["n"] = n = check_whole("n", 1 if n is None else n, 1, LONGEST)
+        asked["w"] = w = check_whole("w", w or 0, -MOST_CELLS, MOST_CELLS)
+    else:
+        if (n, w, start) != (None, None, None):
+            raise InputError("n, w and start must not be given with up_to")
+        asked["up_to"] = n = check_whole("up_to", up_to, 1, MOST)
+    longest = check_whole("longest", longest or up_to or 32, 1, LONGEST)
     numerics = Numerics(RunOptions.of(run, options).in_memory("continuation"))
-    begun = None if start is None else _start(pendulum, axis, start, units)
+    begun = None if start is None else [_start(pendulum, axis, start, n, units)]
     with core_errors():
         run = numerics.run
         along = axis.values.tolist(), axis.kernel
         raw = _core.continuation(bare, along, (n, w), longest, begun, run.workers, run.progress)
-    dataset = _dataset(raw, axis, units)
+    dataset = columns(raw, axis, units)
     ends = [float(end) for end in axis.values[[0, -1]]]
-    asked: dict[str, Any] = {"n": n, "w": w, "longest": longest, "low": ends[0], "high": ends[1]}
-    asked |= {"varied": axis.name} | ({} if start is None else {"start": f"{start}"})
+    asked |= {"longest": longest, "low": ends[0], "high": ends[1], "varied": axis.name}
+    asked |= {} if start is None else {"start": f"{start}"}
     if axis.name in {"omega", "frequency_hz"}:
         dataset.update(backbone.along(pendulum, axis.name))
     values = numerics.provenance() | asked
@@ -219,6 +248,17 @@ def continuation(  # noqa: PLR0913 (physics first, numerical choices by name)
 def _are_axes(ranges: Mapping[str, ArrayLike]) -> bool:
     """Return whether each of the ranges is an axis: not those of one curve."""
     return all(isinstance(values, tuple | Mapping) for values in ranges.values())
+
+
+def stable_orbits(dataset: xr.Dataset, value: float) -> list[dict[str, Any]]:
+    """Return the orbits that are stable at a value of the parameter.
+
+    ``dataset`` is a result of :func:`pendmap.continuation` with ``up_to``; orbits are known up to
+    that period. Each has ``name``, ``n``, ``w`` and ``branch``; twins and both senses of a rotation
+    are there, what friction holds is not. Outside the range there are none.
+    """
+    inside = [one["stable"] for one in regions(dataset) if one["from"] <= value <= one["to"]]
+    return inside[0] if inside else []
 
 
 def _with_count(ranges: Mapping[str, ArrayLike]) -> Mapping[str, ArrayLike]:
@@ -234,13 +274,18 @@ def _with_count(ranges: Mapping[str, ArrayLike]) -> Mapping[str, ArrayLike]:
     return pairs | {k: (*one[:2], _PLACES) for k, one in ends.items()}
 
 
+def state(name: str, value: tuple[float, float]) -> tuple[float, float]:
+    """Return angle and velocity of a start."""
+    if np.asarray(value, dtype=object).shape != (2,):
+        raise InputError(f"{name} must be (angle, velocity), got {short_repr(value)}")
+    return check_number(name, value[0]), check_number(name, value[1])
+
+
 def _start(
-    model: Pendulum | Rig, axis: Varied, start: tuple[float, float], units: Units
-) -> tuple[float, float, float]:
-    """Return angle, velocity without dimensions, and the model's own value of the parameter."""
-    if np.asarray(start, dtype=object).shape != (2,):
-        raise InputError(f"start must be (angle, velocity), got {short_repr(start)}")
-    angle, speed = (check_number("start", part) for part in start)
+    model: Pendulum | Rig, axis: Varied, start: tuple[float, float], n: int, units: Units
+) -> tuple[float, float, int, float]:
+    """Return angle, velocity without dimensions, period, the model's value of the parameter."""
+    angle, speed = state("start", start)
     of_effects = {f"{e.name}.{key}": x for e in model.effects for key, x in e.parameters.items()}
     value = {**model.attributes, **of_effects}.get(axis.name)
     if axis.name == "frequency_hz" and isinstance(model, Rig):
@@ -250,10 +295,10 @@ def _start(
         raise InputError(
             f"{axis.name} of the model must be in the range where a start is given, got {value}"
         )
-    return angle, float(units.bare(speed, VELOCITY)), value
+    return angle, float(units.bare(speed, VELOCITY)), n, value
 
 
-def _dataset(raw: _core.Continuation, axis: Varied, units: Units) -> xr.Dataset:
+def columns(raw: _core.Continuation, axis: Varied, units: Units) -> xr.Dataset:
     """Return branches, orbits, points and events as variables."""
     branches, owner, value = raw.n.size, raw.orbit_branch, raw.value
     multipliers = raw.multipliers.reshape(-1, 2, 2)
@@ -278,6 +323,9 @@ def _dataset(raw: _core.Continuation, axis: Varied, units: Units) -> xr.Dataset:
     data: dict[str, Any] = {
         "branch_n": variable("branch", raw.n, "periods", "smallest period"),
         "branch_w": variable("branch", raw.w, "turns", "net turns over it"),
+        "branch_kind": variable(
+            "branch", np.array(raw.kind, dtype=str), long_name="kind of orbits"
+        ),
         "branch_symmetric": flag("branch", raw.symmetric, "whether orbits are mirror symmetric"),
         "branch_begin": variable("branch", words[:, 0], long_name="why it ends at its beginning"),
         "branch_end": variable("branch", words[:, 1], long_name="why it ends"),
@@ -319,25 +367,40 @@ def _dataset(raw: _core.Continuation, axis: Varied, units: Units) -> xr.Dataset:
         data["section_value"] = ("section", np.array(places, float), axis.attributes)
         counted_there = np.array(counts, np.int32)
         data["section_orbits"] = variable("section", counted_there, "1", "orbits found there")
+    if raw.regions:
+        low, high = np.array(raw.regions).T
+        of, stable = np.array(raw.stable, dtype=np.int32).reshape(-1, 2).T
+        data["region_from"] = ("region", low, axis.attributes)
+        data["region_to"] = ("region", high, axis.attributes)
+        data["stable_region"] = variable("stable", of, "1", "number of the region")
+        data["stable_branch"] = variable("stable", stable, "1", "branch of an orbit stable there")
     return xr.Dataset(data)
 
 
 def _summary(dataset: xr.Dataset) -> list[str]:
     a, count = facts(dataset), dataset.sizes["branch"]
     name = str(a["varied"])
-    which = f"of period {a['n']} and {counted(abs(a['w']), 'net turn')}"
+    which = f"all up to period {a.get('up_to')}"
+    if "n" in a:
+        which = f"from those of period {a['n']} and {counted(abs(a['w']), 'net turn')}"
     every = counted(count, "branch", "branches")
-    lines = [f"{span(name, a['low'], a['high'])}: {every} of orbits, from those {which}."]
+    lines = [f"{span(name, a['low'], a['high'])}: {every} of orbits, {which}."]
     names = ("kind", "value", "n", "w", "supercritical")
-    events = list(rows(dataset, *(f"event_{key}" for key in names)))
-    for kind, value, n, w, side in events[:_LISTED]:
+    happens = list(rows(dataset, *(f"event_{key}" for key in names)))
+    for kind, value, n, w, side in happens[:_LISTED]:
         of = {0: ", subcritical", 1: ", supercritical"}.get(side, "")
         lines.append(f"{kind.replace('_', ' ')} of {n}:{w} at {name} = {value:.12g}{of}.")
-    if len(events) > _LISTED:
-        lines.append(f"{len(events) - _LISTED} more events are in the result.")
+    parts = regions(dataset)
+    for part in parts[:_LISTED]:
+        stable = ", ".join(orbit["name"] for orbit in part["stable"]) or "none"
+        lines.append(f"{span(name, part['from'], part['to'])}: stable orbits: {stable}.")
+    more = {"events": len(happens), "regions": len(parts)}
+    lines += [
+        f"{k - _LISTED} more {what} are in the result." for what, k in more.items() if k > _LISTED
+    ]
     if "section_value" in dataset:
-        searched = counted(dataset.sizes["section"], "section")
-        lines.append(f"Orbits were searched at {searched} of the range.")
+        sections = counted(dataset.sizes["section"], "section")
+        lines.append(f"Orbits were searched at {sections} of the range.")
     lost = [end for side in ("begin", "end") for end in dataset[f"branch_{side}"].values.tolist()]
     open_ends = sum(end in {"precision lost", "branches cross"} for end in lost)
     if open_ends:

@@ -23,8 +23,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import xarray as xr
 
+from pendmap import _core
 from pendmap.analysis.fractality import BOX
-from pendmap.analysis.matching import matched
 from pendmap.analysis.orbit_table import attractors_of, points_of
 from pendmap.analysis.result import Field, indices, rows
 from pendmap.analysis.varied import with_values
@@ -267,7 +267,9 @@ def _named(dataset: xr.Dataset, ends: dict[str, tuple[str, Floats]]) -> list[str
     plain = [one.plain for one in attractors_of(dataset)]
     points, known = points_of(dataset, "attractor"), list(ends)
     kinds, places = [end for end, _ in ends.values()], [at for _, at in ends.values()]
-    pairs = matched(places, points, lambda k, m: math.inf if kinds[k] == plain[m] else 0.0)
+    reach = [[math.inf if kind == name else 0.0 for name in plain] for kind in kinds]
+    sets = [[at.tolist() for at in every] for every in (places, points)]
+    pairs = _core.matched(sets[0], sets[1], reach)
     place = {m: known[k] for *_, k, m in pairs}
     names: list[str] = []
     for k, name in enumerate(dataset["attractor"].values.tolist()):

@@ -5,11 +5,11 @@ along neighbours, starts from the attractors of the model before it. Blocks are 
 along one parameter, 8 x 8 over two.
 
 A branch has one number over the whole sweep. An orbit is followed from one model to the next by
-Newton's method, in halved steps of the parameters along its tangent where a whole one fails; two
-orbits are one where that leads from each to the other without a change of symmetry. What Newton's
-method does not join, chaos and what an orbit becomes where its period doubles, is matched by the
-distances of sets, as Attractors.jl does (Datseris & Wagemakers 2022, Chaos 32, 023104); tumbling
-chaos and running states that no orbit locks are followed by their kind alone.
+Newton's method, and where that fails along its branch up to a fold; two orbits are one where that
+leads from each to the other without a change of symmetry. What is not joined so, chaos and what an
+orbit becomes where its period doubles, is matched by the distances of sets, as Attractors.jl does
+(Datseris & Wagemakers 2022, Chaos 32, 023104); tumbling chaos and running states that no orbit
+locks are followed by their kind alone.
 Nothing depends on the direction of a parameter.
 """
 
@@ -27,7 +27,6 @@ import numpy as np
 from pendmap import _core
 from pendmap.analysis.basin_tiles import sources
 from pendmap.analysis.fractality import uncertainty_exponent
-from pendmap.analysis.matching import distance, matched, numbered
 from pendmap.analysis.result import of_core
 from pendmap.analysis.run import part
 from pendmap.analysis.varied import with_values
@@ -42,7 +41,6 @@ if TYPE_CHECKING:
     from pendmap.analysis.basin_tiles import Axes
     from pendmap.engine import Store, Work
     from pendmap.model import Pendulum
-    from pendmap.signal import Floats
 
     Place = tuple[int, ...]
     """Index of a model along each parameter."""
@@ -61,8 +59,6 @@ _SAME: Final = 1e-6  # Distance within which two orbits of the integration steps
 _LIKE: Final = 0.25  # Largest mean distance between points of sets that follow one another
 _ALONE: Final = ("tumbling_chaos", "quasiperiodic_rotation", "rotation")
 """Kinds that a model has at most once in each sense unless Newton's method finds them."""
-_HALVED: Final = 4  # Number of times that a step of the parameters is halved
-_NEAR: Final = 2.0**-12  # Part of a step of the parameters over which a tangent is taken
 CHECKS: Final = ("unreliable", "unreliable_half_step", "unreliable_mirror")
 LAW: Final = ("uncertainty_exponent", "uncertainty_exponent_stderr")
 MEASURES: Final = (
@@ -153,14 +149,17 @@ class SweepTiles:
         rows = ([(k, m) for m in (spans[1] if k % 2 == 0 else spans[1][::-1])] for k in spans[0])
         return [*itertools.chain.from_iterable(rows)]
 
-    def model(self, place: Sequence[float]) -> Pendulum:
-        """Return the model at a place; between two values where it is no whole number."""
+    def values(self, place: Place) -> dict[str, float]:
+        """Return the values of the parameters at a place."""
         values: dict[str, float] = {}
         for at, axis in zip(place, self.varied, strict=True):
             for name, levels in axis:  # what two axes have is a product, as in the core
-                here = float(np.interp(at, np.arange(len(levels)), levels))
-                values[name] = values.get(name, 1.0) * here
-        return with_values(self.pendulum, values)  # type: ignore[return-value]
+                values[name] = values.get(name, 1.0) * levels[at]
+        return values
+
+    def model(self, place: Place) -> Pendulum:
+        """Return the model at a place."""
+        return with_values(self.pendulum, self.values(place))  # type: ignore[return-value]
 
     def inputs(self, store: Store, step: str, tile: int) -> None:
         """Return nothing: a block needs no other one."""
@@ -265,7 +264,10 @@ def branches(job: SweepTiles, maps: Mapping[Place, Mapped]) -> dict[Place, list[
     links = [(one, other) for _, _, one, other in sorted(near)]
     rests = itertools.pairwise(sorted(_rests(maps, places)))
     links += [(one, other) for (name, one), (same, other) in rests if name == same]
-    return numbered({place: len(maps[place].found) for place in places}, links)
+    index = {place: k for k, place in enumerate(places)}
+    numbers = [((index[a], k), (index[b], m)) for (a, k), (b, m) in links]
+    sizes = [len(maps[place].found) for place in places]
+    return dict(zip(places, _core.numbered(sizes, numbers), strict=True))
 
 
 def _rests(maps: Mapping[Place, Mapped], places: list[Place]) -> Iterator[tuple[str, Node]]:
@@ -293,9 +295,10 @@ def _links(
         alone = old[k].kind == new[m].kind in _ALONE and k not in here and m not in there
         return math.inf if alone else _LIKE
 
-    first, second = ([np.array(one.points) for one in every] for every in (old, new))
+    first, second = ([one.points for one in every] for every in (old, new))
+    reaches = [[reach(k, m) for m in range(len(new))] for k in range(len(old))]
     orbits = [(k, m) for k, m in ahead.items() if back.get(m) == k]
-    pairs = matched(first, second, reach, orbits, circle=circle)
+    pairs = _core.matched(first, second, reaches, orbits, circle)
     return [(near, far, (before, k), (place, m)) for near, far, k, m in pairs]
 
 
@@ -305,37 +308,21 @@ def _followed(
     """Return the attractor of the next model that each orbit leads to, and those it may lead to."""
     old, new = maps[before].found, maps[place].found
     steps, circle = maps[before].measures["steps_per_period"], not _core.counts_turns(job.pendulum)
-    first, last = np.array(before, float), np.array(place, float)
+    there = job.values(place)
 
-    def moved(every: list[Found], points: Mapping[int, Floats], at: float) -> dict[int, Floats]:
-        model = job.model((first + at * (last - first)).tolist())
-        states = [(*x.tolist(), every[k].n, every[k].symmetric) for k, x in points.items()]
-        orbits = zip(points, _core.orbits_near(model, steps, states), strict=True)
-        return {k: np.array(one[1]) for k, one in orbits if one and one[0] == every[k].w}
+    def moved(every: list[Found], start: Place) -> dict[int, Sequence[Sequence[float]]]:
+        along = [(name, value, there[name]) for name, value in job.values(start).items()]
+        orbits = {k: a for k, a in enumerate(every) if a.n}
+        states = [(a.points[0][0], a.points[0][1], a.n, a.symmetric) for a in orbits.values()]
+        near = _core.orbits_near(job.pendulum, along, steps, states)
+        ends = zip(orbits, near, strict=True)
+        return {k: one[1] for k, one in ends if one and one[0] == every[k].w}
 
-    starts, theirs = (
-        {k: np.array(a.points[0]) for k, a in enumerate(every) if a.n} for every in (old, new)
-    )
-    ends, those = moved(old, starts, 1.0), moved(new, theirs, 1.0)
-    for k in starts.keys() - ends.keys():
-        at, step, point = 0.0, 0.5, starts[k]
-        while at < 1.0 and step >= 0.5**_HALVED:
-            near = moved(old, {k: point}, at + _NEAR).get(k)
-            change = np.zeros(2) if near is None else near[0] - point
-            if circle:
-                change[0] = math.remainder(change[0], math.tau)
-            length = min(step, 1.0 - at)
-            orbit = moved(old, {k: point + length / _NEAR * change}, at + length).get(k)
-            if orbit is None:
-                step *= 0.5
-            else:
-                at, point = at + length, orbit[0]
-        if orbit is not None and at == 1.0:
-            ends[k] = orbit
+    ends, those = moved(old, before), moved(new, place)
     followed = {}
     for k, points in ends.items():
         alike = [m for m in those if (new[m].n, new[m].w) == (old[k].n, old[k].w)]
-        far = {m: distance(points[:1], those[m], circle=circle) for m in alike}
+        far = {m: _core.distance(points[:1], those[m], circle) for m in alike}
         nearest = min(far, key=far.__getitem__, default=None)
         if nearest is not None and far[nearest] < _SAME:
             followed[k] = nearest

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendmap._core import Attractor
+from pendmap.analysis.bifurcation import followed
 from pendmap.analysis.orbit_table import attractors_of
-from pendmap.charts import names, palette, plane
+from pendmap.charts import continuation, names, palette, plane
 from pendmap.charts.chart import Axis, Chart, Panel, holding
 from pendmap.charts.legend import colours_of, typeset
 from pendmap.charts.marks import QUIET, Image, Level, Mark, Points
@@ -103,6 +104,8 @@ def _points(dataset: xr.Dataset, every: list[Family], which: str) -> list[Mark]:
         of = 0.45 if one.chaotic else size
         points = one.points[:, [0, column]]
         drawn.append(_dots(dataset, one, points, of, f"{k}/points", _text(every, k)))
+    if (branches := followed(dataset)).sizes:
+        drawn += [*continuation.lines(branches, which, None), *continuation.events(branches, which)]
     return drawn
 
 

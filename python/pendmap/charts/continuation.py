@@ -18,13 +18,14 @@ from pendmap.files import facts
 from pendmap.units import Units
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     import xarray as xr
 
     from pendmap.charts.marks import Dash, Floats
 
 _COLOURS: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
+_UNSTABLE: Final = {"colour": "#555555", "width": 0.7, "name": "unstable"}
 _MARKERS: Final = {
     "fold": "s",
     "period_doubling": "o",
@@ -65,49 +66,59 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     sides = names.phase_plane(theta, holding(dataset["point_velocity"].values), units)
     label = names.symbol(name, str(dataset["orbit_value"].attrs.get("units", "1")))
     below = Axis(label, (float(a["low"]), float(a["high"])))
+    types = dict.fromkeys(rows(dataset, "branch_n", "branch_w"))
+    colours = dict(zip(types, itertools.cycle(_COLOURS), strict=False))
     panels = [
-        Panel(which, "", below, side, _marks(dataset, which))
+        Panel(which, "", below, side, [*lines(dataset, which, colours), *events(dataset, which)])
         for which, side in zip(("theta", "velocity"), sides, strict=True)
     ]
     if name in {"omega", "frequency_hz"} and np.isfinite(dataset["orbit_amplitude"]).any():
         side = Axis("amplitude (rad)", (0.0, 1.05 * float(dataset["orbit_amplitude"].max())))
-        curves = [*_backbones(dataset), *_marks(dataset, "amplitude")]
-        panels.append(Panel("resonance", "", below, side, curves))
-    title = f"Branches of orbits {a['n']}:{a['w']} over {names.over([name])}"
+        curves = [lines(dataset, "amplitude", colours), events(dataset, "amplitude")]
+        marks = [*_backbones(dataset), *itertools.chain(*curves)]
+        panels.append(Panel("resonance", "", below, side, marks))
+    which = f"{a['n']}:{a['w']}" if "n" in a else f"up to period {a['up_to']}"
+    title = f"Branches of orbits {which} over {names.over([name])}"
     chosen = names.parameters(a, [name])
     return Chart(title, chosen, [[panel] for panel in panels], size=(7.4, 6.8)).only(layer)
 
 
-def _marks(dataset: xr.Dataset, which: str) -> list[Mark]:
-    """Return the branches as lines, one for each of their points, and the events."""
+def lines(
+    dataset: xr.Dataset, which: str, colours: Mapping[tuple[int, int], str] | None
+) -> Iterator[Mark]:
+    """Yield the branches, one line for each of their points; without colours unstable ones."""
     branch, value = dataset["orbit_branch"].values, dataset["orbit_value"].values
     stable, of = dataset["orbit_stable"].values.astype(bool), dataset["point_orbit"].values
+    # Pieces on both sides of an event end there.
+    ends = np.isin(np.arange(value.size), dataset["event_orbit"].values)
     whole = which == "amplitude"  # one number of an orbit, not of each of its points
     y = dataset["orbit_amplitude" if whole else f"point_{which}"].values
-    marks: list[Mark] = []
-    types = [*rows(dataset, "branch_n", "branch_w")]
-    colours = dict(zip(dict.fromkeys(types), itertools.cycle(_COLOURS), strict=False))
-    for number, (n, w) in enumerate(types):
+    for number, (n, w) in enumerate(rows(dataset, "branch_n", "branch_w")):
         mine = branch == number
-        points = y[mine][:, None] if whole else y[mine[of]].reshape(-1, n)
-        x, full = value[mine], stable[mine]
-        for way, (dash, shown) in enumerate((("-", full), (DASHED, ~full))):
-            # A piece belongs to both looks at the orbit where it changes.
-            near = shown | np.roll(shown, 1) & (np.arange(shown.size) > 0)
-            for k in range(points.shape[1]):
-                line = np.where(near, points[:, k], np.nan)
+        points, x = y[mine][:, None] if whole else y[mine[of]].reshape(-1, n), value[mine]
+        for way in range(2):
+            dash: Dash = DASHED if way else "-"
+            shown = (stable != way) | ends
+            for k in range(points.shape[1] if colours or way else 0):
+                line = np.where(shown[mine], points[:, k], np.nan)
                 wraps = np.abs(np.diff(line, prepend=line[:1])) > np.pi
                 line[wraps if which == "theta" else np.zeros_like(wraps)] = np.nan
-                text = f"{n}:{w}" if not way and not k else ""
-                look: dict[str, Any] = {"colour": colours[n, w], "dash": dash, "name": text}
-                marks.append(Line(x, line, path=f"{number}/{way}/{k}", **look))
+                look: dict[str, Any] = _UNSTABLE
+                if colours:
+                    look = {"colour": colours[n, w], "name": f"{n}:{w}" if way + k == 0 else ""}
+                yield Line(x, line, dash=dash, path=f"branch/{number}/{way}/{k}", **look)
+
+
+def events(dataset: xr.Dataset, which: str) -> Iterator[Mark]:
+    """Yield what happens on the branches, the marks of each kind."""
     kinds = dataset["event_kind"].values
-    heights = y[dataset["event_orbit"].values] if whole else dataset[f"event_{which}"].values
+    if which == "amplitude":
+        heights = dataset["orbit_amplitude"].values[dataset["event_orbit"].values]
+    else:
+        heights = dataset[f"event_{which}"].values
     for kind in dict.fromkeys(kinds.tolist()):
         at = kinds == kind
-        place = dataset["event_value"].values[at], heights[at]
-        marks.append(_events(kind, *place))
-    return marks
+        yield _events(kind, dataset["event_value"].values[at], heights[at])
 
 
 def _events(kind: str, x: Floats, y: Floats) -> Points:

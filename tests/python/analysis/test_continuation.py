@@ -6,11 +6,12 @@ import math
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, fsolve
 
 import pendmap
 from by_scipy import poincare
-from pendmap import Effect, InputError, Pendulum, Rig
+from pendmap import Effect, Formula, InputError, Pendulum, Rig
 
 BASE = Pendulum(gamma=0.1, omega=2.0)
 
@@ -39,12 +40,14 @@ def test_a_fold_and_a_doubling_are_where_scipy_has_them() -> None:
 
 def test_branches_end_with_a_reason_and_twins_are_told() -> None:
     result = pendmap.continuation(BASE, {"p": (0.1, 1.4)}, 2, 0, longest=2)
-    assert result.branch_symmetric.values.tolist() == [1, 0, 0]
-    assert result.branch_twin.values.tolist() == [-1, 2, 1]
+    # The symmetric one, rest that it is born of, the twins.
+    assert result.branch_symmetric.values.tolist() == [1, 1, 0, 0]
+    assert result.branch_twin.values.tolist() == [-1, -1, 3, 2]
     ends = {*result.branch_begin.values.tolist(), *result.branch_end.values.tolist()}
     assert ends == {"meets rest", "end of the range", "meets its parent orbit"}
     fields = pendmap.analysis.continuation.SCHEMA.json(result)
     assert {event["kind"] for event in fields["events"]} == {"symmetry_breaking", "period_doubling"}
+    assert [branch["kind"] for branch in fields["branches"]][:2] == ["oscillation", "rest"]
     assert all(len(branch["ends"]) == 2 for branch in fields["branches"])
 
 
@@ -88,3 +91,54 @@ def test_a_start_must_be_near_an_orbit_of_the_model() -> None:
         pendmap.continuation(model, {"p": (0.7, 1.0)}, 1, 1, start=(-0.96, 2.43))
     with pytest.raises(InputError, match="range of two values"):
         pendmap.continuation(model, {"p": (0.7, 0.7)}, 1, 1)
+
+
+def test_all_types_up_to_a_period_give_regions_of_stable_orbits() -> None:
+    result = pendmap.continuation(BASE, {"p": (0.3, 1.45)}, up_to=2)
+    schema = pendmap.analysis.continuation.SCHEMA.json(result)
+    assert [region["to"] for region in schema["regions"]][:-1] == pytest.approx(
+        [
+            0.378948709876,
+            0.382951825776,
+            0.416787572822,
+            1.258943005924,
+            1.331299842711,
+            1.346858522520,
+        ],
+        abs=1e-9,
+    )
+    for value in (0.4, 1.0, 1.3, 1.34, 1.4):
+        stable = pendmap.analysis.continuation.stable_orbits(result, value)
+        basins = pendmap.basins(Pendulum(p=value, gamma=0.1, omega=2.0), pendmap.Grid.square(60))
+        short = sorted(zip(*(basins[key].values.tolist() for key in ("n", "w")), strict=True))
+        known = sorted((orbit["n"], orbit["w"]) for orbit in stable)
+        assert known == [pair for pair in short if 1 <= pair[0] <= 2]
+    with pytest.raises(InputError, match="must not be given with up_to"):
+        pendmap.continuation(BASE, {"p": (0.3, 1.5)}, 1, up_to=2)
+
+
+def test_an_invariant_curve_begins_on_the_side_that_is_named() -> None:
+    def largest(b: float, c: float, start: float, until: float) -> float:
+        """Return the largest angle of scipy's motion near the end."""
+        result = solve_ivp(
+            lambda t, x: [
+                x[1],
+                -(0.2 - b) * x[1] - c * x[1] ** 3 - (1 + 0.05 * math.cos(1.3 * t)) * math.sin(x[0]),
+            ],
+            (0, until),
+            [start, 0.0],
+            rtol=1e-9,
+            atol=1e-10,
+        )
+        return float(np.abs(result.y[0, result.t > until - 20]).max())
+
+    for c, side in ((0.5, 1), (-0.5, 0)):
+        pump = Formula("pump", "b*v - c*v^3", {"b": 1, "c": -1})(b=0.18, c=c)
+        model = Pendulum(gamma=0.2, p=0.05, omega=1.3, effects=(pump,))
+        result = pendmap.continuation(model, {"pump.b": (0.15, 0.25)}, start=(0.0, 0.0))
+        kinds = result.event_kind.values == "neimark_sacker"
+        assert result.event_supercritical.values[kinds].tolist() == [side]
+    # Supercritical: a small motion grows to a curve beyond. Subcritical: a large one grows before.
+    assert 0.1 < largest(0.21, 0.5, 1e-3, 2000) < 0.25
+    assert largest(0.19, -0.5, 0.05, 600) < 1e-2
+    assert largest(0.19, -0.5, 0.2, 100) > 0.25

@@ -12,6 +12,7 @@ from drawn import made, named, titles
 from pendmap import Effect, Grid, Pendulum, Rig
 from pendmap._core import Attractor
 from pendmap.analysis.orbit_table import attractors_of
+from pendmap.charts import bifurcation
 from pendmap.charts import parameter_map as drawn
 from recordings import recorded
 
@@ -168,7 +169,7 @@ def test_branches_end_where_their_orbits_do(diagram: xr.Dataset, truths: dict[st
     assert abs(begun[1] - float(known["osc_SB"]["p"])) < step
 
 
-def test_sweeps_start_where_they_are_told_and_report_mirror_images() -> None:
+def test_sweeps_start_where_they_are_told_and_mirror_images_are_no_difference() -> None:
     ranges = {"p": (0.5, 0.6, 3)}
     for start, kind in (((1.2, -2.3), "rotation 1:-1"), ((-1.196, 0.29), "oscillation 2:0")):
         found = pendmap.bifurcation(Pendulum(), ranges, start=start)
@@ -176,7 +177,8 @@ def test_sweeps_start_where_they_are_told_and_report_mirror_images() -> None:
     found = pendmap.bifurcation(Pendulum(), {"p": (1.0, 1.5, 26)})
     on = [found[sweep].values[found["p"].values > 1.4] for sweep in ("up", "down")]
     assert (found["entry_w"].values[on[0]] == -found["entry_w"].values[on[1]]).all()
-    assert "mirror images of one another at p = 1.36 to 1.5" in found.attrs["summary"]
+    # From p = 1.36 on they are mirror images of one another.
+    assert "Hysteresis: up and down differ at p = 1 to 1.34" in found.attrs["summary"]
 
 
 @pytest.mark.parametrize("offset", [0.0, 0.37])
@@ -190,7 +192,7 @@ def test_sweeps_settle_at_supercritical_bifurcations(truths: dict[str, Any], off
         ranges = {"p": (first, first + 11 * step, 12)}
         found = pendmap.bifurcation(Pendulum(omega=omega), ranges)
         assert min(found["up"].values.min(), found["down"].values.min()) >= 0
-        assert "hysteresis" not in found.attrs["summary"]
+        assert "Hysteresis" not in found.attrs["summary"]
 
 
 def test_rest_under_a_torque_is_followed_to_its_fold_and_the_running_state_is_found() -> None:
@@ -207,3 +209,17 @@ def test_rest_under_a_torque_is_followed_to_its_fold_and_the_running_state_is_fo
     assert (kinds[up[torque < 0.95]] == "rest").all()
     assert (kinds[down[torque > 0.2]] == "rotation 1:+1").all()
     assert (kinds[down[torque < 0.1]] == "rest").all()
+
+
+def test_followed_branches_are_in_the_result_and_its_chart(tmp_path: Path) -> None:
+    plain = pendmap.bifurcation(Pendulum(gamma=0.1, omega=2.0), {"p": (0.3, 1.3, 21)})
+    assert pendmap.analysis.bifurcation.SCHEMA.json(plain)["events"] == []
+    found = pendmap.bifurcation(Pendulum(gamma=0.1, omega=2.0), {"p": (0.3, 1.3, 21)}, branches=2)
+    pendmap.save(found, tmp_path / "one.nc")
+    again = pendmap.load(tmp_path / "one.nc")
+    events = pendmap.analysis.bifurcation.SCHEMA.json(again)["events"]
+    chart = bifurcation.chart(again)
+    folds = {round(one["value"], 9) for one in events if (one["kind"], one["n"]) == ("fold", 1)}
+    assert folds == {0.416787573}
+    names = {mark.name for row in chart.rows for panel in row for mark in panel.marks}
+    assert {"unstable", "fold", "symmetry breaking"} <= names
