@@ -23,7 +23,7 @@ from pendmap.diagnosis.named import NamedEffect, effect_values
 from pendmap.diagnosis.table import HEAD, NOTE, Standings
 from pendmap.formatting import Estimate
 from pendmap.identification.report import in_line
-from pendmap.identification.results import ARRAYS, FitResult, Followed
+from pendmap.identification.results import FitResult, Followed
 from pendmap.model.effects import definition
 from pendmap.model.labels import unit_of
 from pendmap.model.rig import own_name
@@ -75,17 +75,6 @@ class Discrepancy(FitResult):
     """Result of a diagnosis: where a model and records disagree, and why."""
 
     KIND: ClassVar[str] = "diagnosis"
-    ARRAYS = ARRAYS | {
-        "Forecast.horizon": ("bin", "s", "middle of a bin of the horizon"),
-        "Forecast.before": ("bin", "rad", "rms error of the baseline, modulo a turn"),
-        "Forecast.after": ("bin", "rad", "rms error of the selected model, modulo a turn"),
-        "ResidualNoise.laws": {
-            "level": ("law", "1", "level of the noise by a law"),
-            "probability": ("law", "1", "probability of a law"),
-        },
-        "Scores.gram": ("response response_2", "1", "product of two unit responses"),
-        "Scores.pull": ("response", "1", "product of a unit response with the residuals"),
-    }
 
     data: DataSplit  # The records: fitted and held back
     base: ScoredModel  # The baseline

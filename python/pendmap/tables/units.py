@@ -5,12 +5,11 @@ from __future__ import annotations
 import dataclasses
 import functools
 import re
-import tomllib
 import unicodedata
-from importlib import resources
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from pendmap.errors import InputError
+from pendmap.files.toml import packaged
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -24,9 +23,7 @@ PIVOT_UNITS: Final = {
     "cm": ("m", 1e-2),
     "mm": ("m", 1e-3),
 }
-_TABLES: Final[dict[str, Any]] = tomllib.loads(
-    resources.files("pendmap.tables").joinpath("words.toml").read_text("utf-8")
-)
+_TABLES: Final = packaged("tables/words.toml")
 TIMES: Final[dict[str, float]] = _TABLES["time"]
 ANGLES: Final[dict[str, float]] = _TABLES["angle"]
 LENGTHS: Final[dict[str, float]] = _TABLES["length"]
