@@ -28,6 +28,7 @@ from pendmap.model.effects import definition
 from pendmap.model.labels import unit_of
 from pendmap.model.rig import own_name
 from pendmap.records.summary import doubt_lines, finding_lines
+from pendmap.residuals.torque import OVER
 from pendmap.signal.robust import Z95
 
 if TYPE_CHECKING:
@@ -55,15 +56,6 @@ SAID: Final = {
     "unknown": "something is missing that no candidate explains; no name is claimed",
 }
 """Meaning of each verdict, in the summary and in the report."""
-
-PLACES: Final[dict[str, str]] = {
-    "angle": "at an angle of",
-    "velocity": "at a velocity of",
-    "amplitude": "at an amplitude of",
-    "drive_phase": "at a phase of the drive of",
-    "lab_time": "at a time in the laboratory of",
-}
-"""Text before the bin of a missing torque, by quantity."""
 
 TORQUE: Final = unit_of("torque")  # Unit of a torque per moment of inertia
 WHERE: Final = 3  # Number of bins of a residual torque in the summary
@@ -320,8 +312,9 @@ def as_text(result: Discrepancy) -> Iterator[str]:
     yield from _remarks(result)
     for row in result.clearest[:WHERE]:
         what = "torque along the motion" if row["along_motion"] else "torque"
+        at = " ".join(OVER[row["over"]][:2])
         yield (
-            f"Where: a {what} of {row['torque']:.3g} {TORQUE} is missing {PLACES[row['over']]} "
+            f"Where: a {what} of {row['torque']:.3g} {TORQUE} is missing at {at} of "
             f"{row['from']:.3g} to {row['to']:.3g} {row['unit']} ({row['z']:.1f} standard errors)"
         )
     if result.advice.next_experiment is not None:
