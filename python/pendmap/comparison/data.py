@@ -120,10 +120,7 @@ def split_records(experiment: Experiment) -> DataSplit:
 
 
 def _readings(runs: Sequence[Run]) -> tuple[Reading, ...]:
-    """Return the noise of each run's readings.
-
-    A run too short to estimate it has the median of the others, since one sensor reads all runs.
-    """
+    """Return the noise of each run's readings; a run too short has the median of the others."""
     every = [reading_of_run(run) for run in runs]
     known = [reading for reading in every if reading.doubt <= KNOWN]
     if known:
@@ -231,10 +228,7 @@ def average_blocks(run: FitRun) -> FitRun:
 def _block_means(
     time: Floats, theta: Floats, weights: Floats, size: int
 ) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return mean time, mean reading, weight and variance of the times of each full block.
-
-    A block without included readings has the unweighted means.
-    """
+    """Return mean time and reading (unweighted if none counts), weight and variance of times."""
     count = time.size // size
     t, x, w = (values[: count * size].reshape(count, size) for values in (time, theta, weights))
     total = w.sum(axis=1)

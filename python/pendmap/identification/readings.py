@@ -88,11 +88,7 @@ def reading_of(
 
 
 def _noise_of_swings(time: Floats, theta: Floats, sigma: float) -> float:
-    """Return the noise of few samples per period, which polynomials do not follow, rad.
-
-    It is the residual of a pendulum with friction in windows of one swing, with an initial state
-    each; ``sigma``, an upper limit, is returned without a fit.
-    """
+    """Return the noise, at most ``sigma``, rad: the residual of a pendulum fitted to each swing."""
     start = rough_start(time, theta, sigma)
     if start is None:
         return sigma
@@ -108,10 +104,7 @@ def _noise_of_swings(time: Floats, theta: Floats, sigma: float) -> float:
 
 
 def as_fit_run(run: Run, reading: Reading) -> FitRun:
-    """Return a run in the format of a fit.
-
-    Times are relative to the first sample, except under a drive, for its phase.
-    """
+    """Return a run in the format of a fit, in times from the first sample except under a drive."""
     time, first = from_first(run.time) if run.drive is None else (run.time, 0.0)
     pivot, gyro = None, run.gyroscope
     if run.pivot is not None:

@@ -36,10 +36,7 @@ class Outline:
 
 
 def outline(time: Floats, theta: Floats, sigma: float) -> Outline | None:
-    """Return the turns of a record by hysteresis, first of the raw, then of the smoothed angle.
-
-    Returns None for fewer than two turns.
-    """
+    """Return a record's turns by hysteresis, of the raw, then smoothed angle; None below two."""
     if time.size < _FEWEST:
         return None
     # The median of five neighbours removes outliers and keeps monotone runs.
@@ -148,10 +145,7 @@ class End:
     window: float = 0.0  # half-width of the fitted window, s
 
     def resolved_from(self, before: End) -> bool:
-        """Return whether the angle differs significantly from that of the end before.
-
-        Always true for a clipped end, whose error is infinite.
-        """
+        """Return whether the angle differs significantly from the end before, or is clipped."""
         error = math.hypot(before.stderr_angle, self.stderr_angle)
         return not math.isfinite(error) or abs(self.angle - before.angle) > _RESOLVED * error
 

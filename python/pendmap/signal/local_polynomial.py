@@ -113,10 +113,7 @@ def even_weights(degree: int, points: int) -> tuple[Floats, Floats]:
 
 
 def _uneven(lag: Floats, theta: Floats, degree: int) -> tuple[Floats, Floats, Floats]:
-    """Return residual over its gain, slope at lag 0 and the slope's error for unit noise.
-
-    ``lag`` and ``theta`` are those of the samples of each window, shape (M, points).
-    """
+    """Return residual over gain, slope at lag 0 and its error, of windows, shape (M, points)."""
     half = theta.shape[1] // 2
     width = np.maximum(np.max(np.abs(lag), axis=1), 1e-12)
     x = lag / width[:, None]
@@ -208,10 +205,7 @@ def _solve(rows: Floats, x: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def smoothed_velocity(time: Floats, theta: Floats, half: float) -> tuple[Floats, Floats]:
-    """Return the velocity by local polynomials, rad/s, and its error for unit noise, 1/s.
-
-    Windows reach ``half`` (s) to both sides, and more where they have too few samples.
-    """
+    """Return velocities by polynomials over ``half`` s, or more, and their error for unit noise."""
     from scipy.signal import savgol_coeffs, savgol_filter  # noqa: PLC0415 (slow to import)
 
     step = float(np.median(np.diff(time)))
