@@ -14,19 +14,11 @@ from pendmap.files.toml import packaged
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
-# Units of a recorded pivot: the SI unit and the factor to it
-PIVOT_UNITS: Final = {
-    "m/s2": ("m/s2", 1.0),
-    "g": ("m/s2", 9.80665),
-    "m/s": ("m/s", 1.0),
-    "m": ("m", 1.0),
-    "cm": ("m", 1e-2),
-    "mm": ("m", 1e-3),
-}
 _TABLES: Final = packaged("tables/words.toml")
 TIMES: Final[dict[str, float]] = _TABLES["time"]
 ANGLES: Final[dict[str, float]] = _TABLES["angle"]
 LENGTHS: Final[dict[str, float]] = _TABLES["length"]
+PIVOT_UNITS: Final = {unit: (si, factor) for unit, (si, factor) in _TABLES["pivot"].items()}
 RAW: Final = frozenset(_TABLES["raw"])
 DEGREE: Final = ANGLES["deg"]
 SPEEDS: Final = {f"{a}/{t}": ANGLES[a] / TIMES[t] for t in ("s", "min") for a in ANGLES}
