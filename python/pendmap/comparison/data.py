@@ -228,7 +228,10 @@ def average_blocks(run: FitRun) -> FitRun:
 def _block_means(
     time: Floats, theta: Floats, weights: Floats, size: int
 ) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return mean time and reading (unweighted if none counts), weight and variance of times."""
+    """Return mean time, mean reading, weight and variance of the times of each full block.
+
+    A block without included readings has the unweighted means.
+    """
     count = time.size // size
     t, x, w = (values[: count * size].reshape(count, size) for values in (time, theta, weights))
     total = w.sum(axis=1)

@@ -214,7 +214,11 @@ def _start_covariance(fit: TrajectoryFit, run: FitRun) -> Floats:
 def drawn_starts(
     start: Sequence[float], covariance: Floats, ensemble: Ensemble, w0: float
 ) -> Floats:
-    """Return normal initial states about a measured one, the first, by ``spread`` too, (2, M)."""
+    """Return random initial states about a measured one, which is the first, shape (2, M).
+
+    Their distribution is normal, with this covariance plus ``spread^2`` in angle and ``(spread
+    w0)^2`` in velocity.
+    """
     wide = covariance + np.diag([ensemble.spread**2, (ensemble.spread * w0) ** 2])
     draw = np.random.default_rng(ensemble.seed)
     drawn = draw.multivariate_normal(np.zeros(2), wide, ensemble.members)

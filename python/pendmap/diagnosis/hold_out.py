@@ -94,7 +94,11 @@ def _of_runs(fit: TrajectoryFit, first: int) -> dict[str, float]:
 
 
 def _without(run: FitRun, number: int) -> FitRun:
-    """Return a free run without a fold, two of ten stretches half a run apart, or a third."""
+    """Return a free run without a part of its readings.
+
+    A fold is two of ten stretches, separated by half the run; two further parts are the first and
+    the last third.
+    """
     if run.forced:
         return run
     trusted = run.counted.copy()

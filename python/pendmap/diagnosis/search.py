@@ -124,7 +124,7 @@ def disguises(state: State, reduced: FittedModel, full: FittedModel) -> list[int
 
 
 def _promising(state: State, fitted: FittedModel) -> tuple[list[list[int]], list[list[int]]]:
-    """Return candidates, and pairs, of the greatest scores: twice as many as are fitted."""
+    """Return the candidates, and pairs, of greatest score: twice as many as are fitted."""
     limits = state.thresholds
     scores = state.scores(fitted)
     ranked = scores.best()

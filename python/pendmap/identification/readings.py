@@ -88,7 +88,11 @@ def reading_of(
 
 
 def _noise_of_swings(time: Floats, theta: Floats, sigma: float) -> float:
-    """Return the noise, at most ``sigma``, rad: the residual of a pendulum fitted to each swing."""
+    """Return the noise of few samples per period, which polynomials do not follow, rad.
+
+    It is the residual of a pendulum with friction in windows of one swing, with an initial state
+    each; ``sigma``, an upper limit, is returned without a fit.
+    """
     start = rough_start(time, theta, sigma)
     if start is None:
         return sigma

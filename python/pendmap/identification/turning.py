@@ -36,7 +36,7 @@ class Outline:
 
 
 def outline(time: Floats, theta: Floats, sigma: float) -> Outline | None:
-    """Return a record's turns by hysteresis, of the raw, then smoothed angle; None below two."""
+    """Return the turns by hysteresis, of the raw, then the smoothed angle; None for one or none."""
     if time.size < _FEWEST:
         return None
     # The median of five neighbours removes outliers and keeps monotone runs.
@@ -145,7 +145,10 @@ class End:
     window: float = 0.0  # half-width of the fitted window, s
 
     def resolved_from(self, before: End) -> bool:
-        """Return whether the angle differs significantly from the end before, or is clipped."""
+        """Return whether the angle differs significantly from that of the end before.
+
+        Always true for a clipped end, whose error is infinite.
+        """
         error = math.hypot(before.stderr_angle, self.stderr_angle)
         return not math.isfinite(error) or abs(self.angle - before.angle) > _RESOLVED * error
 

@@ -90,7 +90,10 @@ def bootstrap(function: Callable[[Floats], Floats], values: Floats, stderr: Floa
 
 
 def least_squares_line(x: Floats, y: Floats, stderr: Floats) -> tuple[Floats, Floats, float]:
-    """Return coefficients, covariance (times a misfit above 1) and misfit, chi^2 over freedom."""
+    """Return coefficients, covariance and misfit of a weighted fit ``y = c_0 + c_1 x``.
+
+    The misfit is chi^2 per degree of freedom; the covariance is multiplied by it if it is above 1.
+    """
     rows = np.column_stack((np.ones_like(x), x))
     return chain_least_squares(rows, y, np.stack((stderr**2, np.zeros(x.size))))
 

@@ -205,7 +205,10 @@ def _solve(rows: Floats, x: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def smoothed_velocity(time: Floats, theta: Floats, half: float) -> tuple[Floats, Floats]:
-    """Return velocities by polynomials over ``half`` s, or more, and their error for unit noise."""
+    """Return the velocity by local polynomials, rad/s, and its error for unit noise, 1/s.
+
+    Windows reach ``half`` (s) to both sides, and more where they have too few samples.
+    """
     from scipy.signal import savgol_coeffs, savgol_filter  # noqa: PLC0415 (slow to import)
 
     step = float(np.median(np.diff(time)))

@@ -74,7 +74,10 @@ def _commit(lanes: Lanes, step: Step) -> None:
 
 
 def may_turn(velocity: Floats, acceleration: Floats, length: Floats) -> NDArray[np.bool_]:
-    """Return which lanes may come to rest in a step, by values along the direction, (L, 17)."""
+    """Return which lanes may come to rest within the step, shape (L,).
+
+    Velocity and acceleration are those at the 17 places, times the lane's direction, shape (L, 17).
+    """
     crosses = (velocity[:, 1:] <= 0).any(axis=1)
     reach = length / (PLACES.size - 1) * np.abs(acceleration).max(axis=1)
     low = velocity.min(axis=1, where=velocity > 0, initial=np.inf) < reach

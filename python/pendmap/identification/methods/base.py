@@ -181,7 +181,10 @@ def identified(  # noqa: PLR0913 (all of a result)
     misfit: float | None = None,
     intervals: Mapping[str, tuple[float, float]] | None = None,
 ) -> Identification:
-    """Return a result, by default with normal intervals, and warnings of negative damping."""
+    """Return a result with normal 95 % intervals unless they are given; errors of 0 are unknown.
+
+    A warning is added for each negative damping parameter.
+    """
     estimates, negative, known = {}, [], bool(np.any(covariance))
     for name, value, variance in zip(names, values.tolist(), np.diag(covariance), strict=True):
         error = math.sqrt(max(float(variance), 0.0))

@@ -47,7 +47,7 @@ def check_names(methods: Iterable[str] | None) -> list[str]:
 def apply_method(
     name: str, peaks: Peaks, record: tuple[Floats, Floats] | None = None
 ) -> Identification:
-    """Return the result of a method for peaks, and samples (s, rad) if any, of a free decay."""
+    """Return a method's result for the peaks, and samples (s, rad) if any, of a free decay."""
     if peaks.lacking:
         result = inapplicable(peaks.lacking)
     elif name == "energy_balance" and record is not None:
