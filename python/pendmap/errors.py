@@ -133,11 +133,6 @@ def check_whole(name: str, value: object, least: int, most: int) -> int:
     return int(given)
 
 
-def shown_key(key: object) -> str:
-    """Return a key as it is written in messages."""
-    return key if isinstance(key, str) and key.isidentifier() else short_repr(key)
-
-
 def check_keys(
     where: str, given: Iterable[object], known: Collection[str], among: str = ""
 ) -> None:
@@ -148,9 +143,8 @@ def check_keys(
             near = difflib.get_close_matches(str(key).lower(), lower, 1, 0.55)
             perhaps = f", perhaps {lower[near[0]]} is meant" if near else ""
             names = among or ", ".join(known)
-            raise InputError(
-                f"{where}{shown_key(key)} is not known{perhaps}: it must be one of {names}"
-            )
+            shown = key if isinstance(key, str) and key.isidentifier() else short_repr(key)
+            raise InputError(f"{where}{shown} is not known{perhaps}: it must be one of {names}")
 
 
 def check_flag(name: str, value: object) -> bool:

@@ -27,6 +27,7 @@ from pendmap.charts.palette import NOISE, NOISE_SAID, look
 from pendmap.formatting import typographic
 from pendmap.identification.sensitivity import sensitivities
 from pendmap.model.labels import unit_of
+from pendmap.residuals.torque import OVER
 from pendmap.signal.robust import Z95
 
 if TYPE_CHECKING:
@@ -39,14 +40,6 @@ if TYPE_CHECKING:
 ACCELERATION: Final = "rad/s²"  # Unit of a torque per moment of inertia
 RMS: Final = "rms (mrad)"  # Root mean square of residuals, with its unit
 LACKED: Final = "Torque that the model lacks"
-OVER_SAID: Final = {
-    "angle": "angle (rad)",
-    "velocity": "velocity (rad/s)",
-    "amplitude": "amplitude (rad)",
-    "drive_phase": "phase of the drive (rad)",
-    "lab_time": "time in the laboratory (s)",
-}
-"""Axes of the residual torque, with units."""
 BEFORE, AFTER = look("before").colour, look("after").colour
 ALIKE, OTHER = "#56b4e9", "#9a9a9a"
 """Colours of candidates that are indistinguishable from an effect found, and of all others."""
@@ -86,7 +79,7 @@ def parts(result: Discrepancy) -> dict[str, Chart]:
     starts = " and ".join(f"{one.starts} {one.kind}" for one in result.forecasts)
     forecasts = f"forecasts from {starts} starts on what was held out" if starts else ""
     gap = [by_run(result), *(forecast(result, one) for one in result.forecasts)]
-    torques = [torque(result, over) for over in OVER_SAID if _torque_rows(result, over)]
+    torques = [torque(result, over) for over in OVER if _torque_rows(result, over)]
     pairs = [torques[k : k + 2] for k in range(0, len(torques), 2)]
     ranked = [ranking(result)] if result.scores.best() else []
     by_itself = "what each effect promises to close by itself, and closes beside the others"
@@ -239,7 +232,8 @@ def torque(result: Discrepancy, over: str) -> Panel:
             Line(bins[-1], value, width=1.3, name=name, path=name, **look),
         ]
     title = f"{LACKED}, over {over.replace('_', ' ')}"
-    across = Axis(OVER_SAID[over], holding(*bins, margin=0.0) if bins else None)
+    name = "{1} ({2})".format(*OVER[over])
+    across = Axis(name, holding(*bins, margin=0.0) if bins else None)
     up = Axis(f"{text} ({ACCELERATION})", holding(*shown))
     return Panel(over, title, across, up, marks, root=f"torque/{over}")
 

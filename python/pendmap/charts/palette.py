@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from pendmap.files.toml import packaged
+
 if TYPE_CHECKING:
     from pendmap._core import Attractor
 
@@ -26,49 +28,14 @@ _LINEAR = 0.04045  # Value of sRGB up to which it is proportional to luminance
 CONTRAST = 2.0
 """Least contrast (WCAG 2.2) of points with a white ground; yellow has 1.3, sky blue 2.3."""
 
-_SCALES = {
-    "RdBu_r": "053061 2166ac 4393c3 92c5de d1e5f0 f7f7f7 fddbc7 f4a582 d6604d b2182b 67001f",
-    "cividis": "00224e 083370 35456c 4f576c 666970 7d7c78 948e77 aea371 c8b866 e5cf52 fee838",
-    "magma": "000004 140e36 3b0f70 641a80 8c2981 b73779 de4968 f7705c fe9f6d fecf92 fcfdbf",
-    "viridis": "440154 482475 414487 355f8d 2a788e 21918c 22a884 44bf70 7ad151 bddf26 fde725",
-}
-"""Colours at equal steps of the colour maps that charts name, for recordings."""
-
-_FAMILIES = {
-    "rest": "474747 dark grey",
-    "inverted_rest": "c4b49f taupe",
-    "tumbling_chaos": "cc79a7 purple",
-    "libration_chaos": "ffa6d1 pink",
-    "rotating_chaos +": "8f1d4f wine",
-    "rotating_chaos -": "5b2a98 violet",
-    "quasiperiodic_rotation +": "f7c9a8 peach",
-    "quasiperiodic_rotation -": "bfe0f5 ice blue",
-    "rotation +": "d55e00 vermillion, e69f00 orange, 7a2a00 rust, f5b78a apricot, b98300 ochre",
-    "rotation -": "0072b2 blue, 56b4e9 sky blue, 123a6b navy, a9cdee pale blue, 2f8f9d teal",
-    "oscillation 0": "009e73 bluish green, f0e442 yellow, 8f9f25 olive, b5e3a1 pale green,"
-    " 00604a bottle green, c9b458 sand",
-    "oscillation 1": "7adbb8 light green, faf5a8 light yellow, c8d45f light olive, bfe88a lime,"
-    " 2f8a72 sea green, e0d08a straw",
-    "oscillation -1": "00694e dark green, 5f5a00 dark olive, 6b7a1e moss green, 7db356 leaf green,"
-    " 003a2d black green, 968436 bronze",
-}
-"""Colours of each family and their names: by direction, of oscillations by the side of a twin."""
-
-_SHADES = {
+_TABLES: Final = packaged("charts/palette.toml")
+_SHADES: Final = {
     family: [(f"#{one[:6]}", one[7:]) for one in text.split(", ")]
-    for family, text in _FAMILIES.items()
+    for family, text in _TABLES["families"].items()
 }
-_NAMES = dict(shade for shades in _SHADES.values() for shade in shades) | {
-    UNDECIDED: "light grey",
-    FAILED: "black",
-    UNNAMED: "grey",
-    "#222222": "grey",
-    "#666666": "grey",
-    "#e6007e": "magenta",
-    "#19d3f3": "cyan",
-    "#5a1fd1": "indigo",
-}
-"""Names of all colours that are not mixed."""
+_NAMES: Final[dict[str, str]] = (
+    dict(shade for shades in _SHADES.values() for shade in shades) | _TABLES["names"]
+)
 
 _SHAPES = {"oscillation": "sPXph8", "inverted_rest": "D"}  # Markers by kind; others have a disc
 CURVES = ("#e6007e", "#19d3f3", "#5a1fd1")  # Colours of curves on maps, which no attractor has
@@ -129,7 +96,9 @@ def lap(attractor: Attractor) -> int:
 
 def shades(scale: str, at: npt.ArrayLike) -> npt.NDArray[np.uint8]:
     """Return colours of a colour map, shape (n, 3), at places from 0 to 1."""
-    colours = np.array([parts(f"#{code}") for code in _SCALES[scale].split()], dtype=float)
+    colours = np.array(
+        [parts(f"#{code}") for code in _TABLES["scales"][scale].split()], dtype=float
+    )
     steps = np.linspace(0.0, 1.0, len(colours))
     mixed = [np.interp(np.asarray(at, dtype=float), steps, channel) for channel in colours.T]
     return np.round(np.stack(mixed, axis=-1)).astype(np.uint8)
@@ -173,19 +142,7 @@ class Look(NamedTuple):
     dash: str = "-"
 
 
-_LOOKS: Final = {
-    "trajectory": Look("trajectory", "#0072b2"),
-    "combined": Look("combined, as printed", "#d55e00"),
-    "combined_repaired": Look("combined, repaired", "#009e73", "--"),
-    "log_decrement": Look("log decrement", "#e69f00"),
-    "de_paula": Look("de Paula", "#cc79a7"),
-    "energy_balance": Look("energy balance", "#56b4e9", "--"),
-    "model": Look("model", "#0072b2"),
-    "before": Look("before", "#d55e00"),
-    "baseline": Look("baseline", "#d55e00"),
-    "after": Look("after", "#0072b2"),
-}
-"""Colours of Okabe and Ito for methods drawn together."""
+_LOOKS: Final = {method: Look(*about) for method, about in _TABLES["methods"].items()}
 _OTHER: Final = "#8a8a8a"
 
 

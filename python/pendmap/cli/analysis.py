@@ -12,7 +12,7 @@ import click
 
 from pendmap import ANALYSES
 from pendmap.cli.parse import types
-from pendmap.cli.parse.model_options import model_options, varied_model_options
+from pendmap.cli.parse.model_options import model_from, model_options, varied_model_options
 from pendmap.cli.parse.options import (
     OUTPUT,
     START,
@@ -27,184 +27,79 @@ from pendmap.cli.parse.options import (
     window_options,
 )
 from pendmap.cli.parse.signature import GROUPS, options_of, parameters
-from pendmap.cli.show import begin, made_here, show
+from pendmap.cli.show import Outputs, made_here, show
 from pendmap.errors import named
+from pendmap.files.toml import packaged
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from pendmap.analysis.grid import Grid
     from pendmap.cli.parse.options import Decorator
-    from pendmap.cli.show import Outputs
     from pendmap.model import Pendulum, Rig
 
 
 class Entry(NamedTuple):
-    """What a command has beside the options of its function's signature."""
+    """What a command has beside the options of its signature, as ``analyses.toml`` explains."""
 
-    text: str = ""  # its help, by default the description of the analysis
-    examples: Sequence[str] = ()  # by default the command alone
-    example: str = ""  # of the options of its own group
-    left_out: Sequence[str] = ()  # parameters that are no options
-    further: Sequence[Decorator] = ()  # other options
-    model: Decorator = model_options
-    window: tuple[str, str] | None = None  # default of --theta and --velocity, if it has a window
-    stored: bool = False  # computed in tiles, which a store keeps
+    text: str = ""
+    examples: Sequence[str] = ()
+    example: str = ""
+    left_out: Sequence[str] = ()
+    window: Sequence[str] = ()
+    stored: bool = False
 
 
-_STRETCH: Final = group("Trajectory", "--until 500")
+_ENTRIES: Final = {name: Entry(**about) for name, about in packaged("cli/analyses.toml").items()}
 _VIEWER: Final = "127.0.0.1:9876"
-_ENTRIES: Final = {
-    "simulate": Entry(
-        """Integrate one trajectory: time history, energy, phase plane, Poincaré section.
 
-        --live needs a viewer that runs (rerun --bind 127.0.0.1); Ctrl-C then ends the trajectory
-        where it is, and what was computed is written.
-        """,
-        (
-            "pendmap simulate --p 1.5 --omega 0.87 --theta-r 0.2",
-            "pendmap simulate --preset fig2b --until 20000 --lyapunov",
-            "pendmap simulate --preset fig2c --theta 1 --until 600 --out chaos.png",
-        ),
-        example="--samples 128",
-        left_out=("until",),
-        further=(
-            options_of("analysis.lyapunov.lyapunov", "theta velocity"),
-            option("--until", types.NUMBER, "Last time, in 1/w0, in SI s.", 100.0, group=_STRETCH),
-            option(
-                "--live",
-                str,
-                f"Show it in a running viewer while it is computed.  [default: {_VIEWER}]",
-                is_flag=False,
-                flag_value=_VIEWER,
-                metavar="[HOST:PORT]",
-                group=OUTPUT,
-            ),
-        ),
-    ),
-    "basins": Entry(
-        "Map the basins of attraction over initial angle and velocity.",
-        (
-            "pendmap basins --p 1.7",
-            "pendmap basins --p 1 --theta-r 0.05 --grid 400 --out friction.nc",
-        ),
-        example="--draws 100",
-        left_out=("check",),
-        window=("-pi:pi:1000", "-3:3:1000, in SI times w0"),
-        stored=True,
-    ),
-    "sweep": Entry(
-        """Map the basins of attraction along one or two parameters.
 
-        Parameters are ranges A:B:N, like --p 0.5:2:61, or by name: --vary quadratic_drag.q
-        0:0.1:20. Each attractor has one number in all maps.
-        """,
-        ("pendmap sweep --p 0.5:1.7:25 --grid 60",),
-        example="--layer-periods 10",
-        left_out=("check",),
-        model=varied_model_options,
-        window=("-pi:pi:100", "-3:3:100, in SI times w0"),
-        stored=True,
-    ),
-    "map": Entry(
-        """Map which attractors exist over any two parameters.
+def _start(angle: str) -> Sequence[Decorator]:
+    """Return the options of one start, the first with this help."""
+    return (
+        option("--theta", types.NUMBER, angle, group=START),
+        option("--velocity", types.NUMBER, "Velocity there, in SI rad/s.", group=START),
+    )
 
-        Two parameters are ranges A:B:N, like --p 0.05:2.5:200 --omega 0.5:3:200, or by name:
-        --vary quadratic_drag.q 0:0.1:50.
-        """,
-        (
-            "pendmap map --p 0.05:2.5:50 --omega 0.5:3:50 --curves",
-            "pendmap map --vary gamma 0.02:0.4:20 --p 0.2:2:20 --json",
-        ),
-        example="--curves",
-        model=varied_model_options,
-        stored=True,
-    ),
-    "bifurcation": Entry(
-        """Draw stroboscopic points against a parameter: all attractors, and followed up and down.
 
-        One parameter is a range: --vary p 0.9:2:2000, or --p 0.9:2:2000.
-        """,
-        (
-            "pendmap bifurcation --vary p 0.9:2:2000",
-            "pendmap bifurcation --p 0.9:2:500 --theta-r 0.02 --out bifurcation.pdf",
+_FURTHER: Final = {
+    "simulate": (
+        options_of("analysis.lyapunov.lyapunov", "theta velocity"),
+        option(
+            "--until",
+            types.NUMBER,
+            "Last time, in 1/w0, in SI s.",
+            100.0,
+            group=group("Trajectory", "--until 500"),
         ),
-        further=(
-            option("--theta", types.NUMBER, "Angle where both sweeps start, rad.", group=START),
-            option("--velocity", types.NUMBER, "Velocity there, in SI rad/s.", group=START),
+        option(
+            "--live",
+            str,
+            f"Show it in a running viewer while it is computed.  [default: {_VIEWER}]",
+            is_flag=False,
+            flag_value=_VIEWER,
+            metavar="[HOST:PORT]",
+            group=OUTPUT,
         ),
-        model=varied_model_options,
-        stored=True,
     ),
-    "continue": Entry(
-        """Follow periodic orbits along a parameter: branches, folds, doublings, and their ends.
-
-        One parameter is a range: --vary p 0.3:1.6, or --p 0.3:1.6. Two give the curves of folds,
-        doublings and symmetry breakings in their plane.
-        """,
-        (
-            "pendmap continue --vary p 0.3:1.6 --n 1 --w 1",
-            "pendmap continue --vary p 0:2.5 --vary omega 1.5:3 --up-to 2",
-            "pendmap continue --vary p 0.1:1 --n 2 --theta-r 0.05 --omega 1.8 --json",
+    "bifurcation": _start("Angle where both sweeps start, rad."),
+    "continue": _start("Angle of the orbit followed, rad."),
+    "tongues": (
+        option(
+            "--omega omegas",
+            types.VALUES,
+            "Frequencies Omega/w0 of the drive.  [default: 0.5:3:200]",
+            group=group("Frequencies", "--omega 0.5:3:200"),
         ),
-        example="--n 1 --w 1",
-        further=(
-            option("--theta", types.NUMBER, "Angle of the orbit followed, rad.", group=START),
-            option("--velocity", types.NUMBER, "Velocity there, in SI rad/s.", group=START),
-        ),
-        model=functools.partial(varied_model_options, ends=True),
-    ),
-    "orbit": Entry(
-        "Find all periodic orbits of period n and w net turns, stable and unstable.",
-        ("pendmap orbit --p 1.3 --n 2 --w 0", "pendmap orbit --p 1 --n 1 --w 1 --theta-r 0.05"),
-        example="--n 2 --w 0",
-        window=("-pi:pi:200", "depends on n, w and p"),
-    ),
-    "lyapunov": Entry(
-        "Find the largest Lyapunov exponent of the attractor that a start reaches.",
-        ("pendmap lyapunov --preset fig2b", "pendmap lyapunov --p 1.7 --theta 2 --json"),
-    ),
-    "lifetime": Entry(
-        "Measure how long transient chaos lives, or find that it persists.",
-        ("pendmap lifetime --p 1.7", "pendmap lifetime --p 1.808 --starts 10000 --json"),
-        example="--from-period 50 --draws 100",
-        stored=True,
-    ),
-    "tongues": Entry(
-        """Find where rest, hanging and inverted, is stable: critical curves of eq. 1.3, exact.
-
-        Also folds of the oscillations born there, and curves by perturbation.
-        """,
-        (
-            "pendmap tongues --omega 0.5:3:200 --p-max 6",
-            "pendmap tongues --gamma 0 --omega 0.6:2:80 --out mathieu.pdf",
-        ),
-        example="--p-max 6",
-        further=(
-            option(
-                "--omega omegas",
-                types.VALUES,
-                "Frequencies Omega/w0 of the drive.  [default: 0.5:3:200]",
-                group=group("Frequencies", "--omega 0.5:3:200"),
-            ),
-        ),
-        model=functools.partial(model_options, left_out=("omega", "frequency_hz")),
-    ),
-    "backbone": Entry(
-        "List motions without losses and drive, by energy: amplitude, period, rate.",
-        ("pendmap backbone", "pendmap backbone --torque 0.2 --json"),
-        example="--energy-max 6",
-    ),
-    "melnikov": Entry(
-        """Compute the amplitude at which homoclinic tangles begin, by Melnikov's criterion.
-
-        First order, with Coulomb friction and effects. A torque that keeps up a rotation tilts the
-        potential: the threshold is that of the loop of upright rest.
-        """,
-        ("pendmap melnikov --omega 1 --theta-r 0.02", "pendmap melnikov --torque 0.2 --json"),
     ),
 }
-"""By command; an analysis without an entry has what its signature and its description say."""
+"""Options by command that its signature does not have."""
+_MODEL: Final[dict[str, Decorator]] = {
+    **dict.fromkeys(("sweep", "map", "bifurcation"), varied_model_options),
+    "continue": functools.partial(varied_model_options, ends=True),
+    "tongues": functools.partial(model_options, left_out=("omega", "frequency_hz")),
+}
+"""Options of the model, where they are not those of other commands."""
 
 
 @functools.cache
@@ -221,7 +116,9 @@ def command_of(name: str) -> click.Command:
     def run(**given: Any) -> None:  # noqa: ANN401 (the options)
         names = [key for key in ("threads", "seed", "resume") if key in given]
         options: dict[str, Any] = {key: given.pop(key) for key in names}
-        pendulum, outputs = begin(given, name, going_on=options.get("resume", False))
+        reads = [given["model"]]
+        pendulum = model_from(given)
+        outputs = Outputs.take(given, name, reads, going_on=options.get("resume", False))
         arguments = _arguments(name, pendulum, outputs, given)
         module = importlib.import_module(f"pendmap.analysis.{kind}")
         store = outputs.store if entry.stored else None
@@ -245,7 +142,7 @@ def command_of(name: str) -> click.Command:
     names = [n for n, one in declared.items() if one.is_option and n not in entry.left_out]
     first = next((n for n in names if n not in GROUPS), None)
     example = entry.example or f"--{first} {declared[first].default}" if first else ""
-    parts = [entry.model, *entry.further]
+    parts: list[Decorator] = [_MODEL.get(name, model_options), *_FURTHER.get(name, ())]
     if entry.window:
         parts.append(window_options(*entry.window))
     parts.append(options_of(path, " ".join(names), group("Analysis", example)))

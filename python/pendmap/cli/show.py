@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import click
 
-from pendmap.cli.parse.model_options import model_from
 from pendmap.cli.parse.types import PICTURES, REPORTS, TABLES, default_file
 from pendmap.errors import InputError, NotWrittenError, escaped, named, one_line
 from pendmap.files import COMPLETE, held_interrupts
@@ -30,7 +29,6 @@ if TYPE_CHECKING:
 
     from pendmap.analysis.result import Schema
     from pendmap.formatting import Readable
-    from pendmap.model import Pendulum, Rig
 
     Write = Callable[[Path], Path | str]
 
@@ -66,10 +64,7 @@ _WRITERS: Final = {
 
 
 def say(text: str, *, err: bool = False) -> None:
-    """Write lines to stdout or stderr; those of more than 80 columns go on below, indented.
-
-    Control characters, which names of files and columns may have, are escaped.
-    """
+    """Write lines to stdout or stderr, broken at 80 columns, control characters escaped."""
     parts = enumerate(_BOLD.split(text))
     safe = "".join(part if place % 2 else escaped(part) for place, part in parts)
     click.echo(wrapped(safe), err=err)
@@ -196,10 +191,7 @@ class Outputs:
 
     @contextlib.contextmanager
     def progress(self, name: str) -> Iterator[Callable[[int, int], None] | None]:
-        """Yield the callback of progress, None with --quiet.
-
-        On stderr a line tells the time of long work; a terminal has a bar with the time left.
-        """
+        """Yield a callback of progress, a line for long work or a bar; None with --quiet."""
         if self.quiet:
             yield None
             return
@@ -261,15 +253,6 @@ class Outputs:
             from pendmap import viewer
 
             viewer.open_viewer(recording)
-
-
-def begin(
-    given: dict[str, Any], name: str, *, going_on: bool = False
-) -> tuple[Pendulum | Rig, Outputs]:
-    """Remove the options of model and outputs from ``given``; refuse the model's file as output."""
-    file = given["model"]
-    model = model_from(given)
-    return model, Outputs.take(given, name, reads=[file], going_on=going_on)
 
 
 def free_name(
@@ -345,10 +328,7 @@ class Written(list[str]):
             say("Written: " + ", ".join(map(one_line, self)))
 
     def check(self) -> None:
-        """Raise an error if a file was refused, or could not be written to the disk.
-
-        Input is bad only where nothing of the result is written.
-        """
+        """Raise an error for files that are not written; of bad input only where none is."""
         if self.refused and not self:
             raise self.refused[0]
         if missed := [*map(str, self.refused), *self.missed]:

@@ -120,10 +120,7 @@ def split_records(experiment: Experiment) -> DataSplit:
 
 
 def _readings(runs: Sequence[Run]) -> tuple[Reading, ...]:
-    """Return the noise of each run's readings.
-
-    A run too short to estimate it has the median of the others, since one sensor reads all runs.
-    """
+    """Return the noise of each run's readings; a run too short has the median of the others."""
     every = [reading_of_run(run) for run in runs]
     known = [reading for reading in every if reading.doubt <= KNOWN]
     if known:

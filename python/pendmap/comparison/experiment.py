@@ -14,9 +14,8 @@ from pendmap.analysis.run import part
 from pendmap.comparison.forced import FEWEST, Ensemble, ForcedComparison, compare_forced
 from pendmap.comparison.free import MODEL, RunComparison, compare_free
 from pendmap.errors import FitDiverged, InputError
-from pendmap.files.saved import Saved
+from pendmap.files.saved import COLUMNS, Saved
 from pendmap.formatting import counted, percent
-from pendmap.identification import results
 from pendmap.model import Rig
 from pendmap.records import experiment_of, summary
 
@@ -27,7 +26,6 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from pendmap.comparison.itinerary import Cycle, Steady
-    from pendmap.files.saved import About
     from pendmap.formatting import Table
     from pendmap.records import ByHand, Experiment, Run
     from pendmap.records.read import Records
@@ -36,34 +34,6 @@ if TYPE_CHECKING:
 _UNITS: Final = {"period": "s", "peak": "rad"}
 FITS: Final = 1.1
 """Rms residual over noise up to which a model fits; the noise is known to a few percent."""
-ARRAYS: Final[dict[str, About]] = results.ARRAYS | {
-    "RunComparison.curve": results.OF_MODEL,
-    "RunComparison.residual": ("reading", "rad", "reading less model; 0 if excluded"),
-    "ForcedComparison.time": ("instant", "s", "equal times of a forced run"),
-    "ForcedComparison.measured": ("instant", "rad", "record at these times"),
-    "ForcedComparison.velocity": ("instant", "rad/s", "velocity of the record"),
-    "ForcedComparison.example": {
-        "theta": ("instant", "rad", "reading of a member of the ensemble"),
-        "velocity": ("instant", "rad/s", "its velocity"),
-    },
-    "Statistic.ensemble": ("member", "1", "statistic of a member, in its unit"),
-    "Cycle.time": ("phase", "s", "time from a whole number of periods of the drive"),
-    "Cycle.theta": ("phase", "rad", "angle in a cycle, not wrapped"),
-    "Cycle.velocity": ("phase", "rad/s", "velocity in a cycle"),
-}
-"""Dimension, unit and meaning of the arrays of a comparison, by class and field."""
-COLUMNS: Final = {
-    "run": "name of a run",
-    "quantity": "what is compared",
-    "record": "value of the record",
-    "model": "value of the model; of an ensemble the median",
-    "low": "lower end of 95 % of the ensemble",
-    "high": "upper end of 95 % of the ensemble",
-    "chance": "p-value of the record in the ensemble",
-    "error_percent": "absolute error of the model, percent",
-    "unit": "unit of a value; empty for a pure number",
-}
-"""Meaning of the columns of its table."""
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -71,9 +41,7 @@ class Comparison(Saved):
     """Comparison of a model with an experiment."""
 
     KIND: ClassVar[str] = "comparison"
-    ARRAYS = ARRAYS
-    ROWS: ClassVar[str] = "row"
-    COLUMNS = COLUMNS
+    ROWS = "row"
 
     model: Rig  #: The model with its effects, including those on the reading.
     experiment: Experiment  #: The records.
@@ -107,7 +75,7 @@ class Comparison(Saved):
             for one in self.every
             for row in _quantities(one)
         ]
-        table = pd.DataFrame(rows, columns=[*COLUMNS]).set_index(["run", "quantity"])
+        table = pd.DataFrame(rows, columns=[*COLUMNS[self.ROWS]]).set_index(["run", "quantity"])
         return table.astype({name: "string" if name == "unit" else float for name in table})
 
     def text_parts(self) -> tuple[list[Table], list[str]]:

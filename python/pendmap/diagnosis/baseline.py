@@ -191,10 +191,7 @@ def lost_runs(runs: Sequence[FitRun], fit: TrajectoryFit) -> dict[int, float]:
 
 @none_if_diverged
 def _through_all(data: DataSplit, start: Rig, free: list[str]) -> FittedModel | None:
-    """Return a fit started from a fit to all samples if stretches are held back, else None.
-
-    A fit with gaps fails more easily. The returned fit does not use the stretches held back.
-    """
+    """Return a fit started from one to all samples if stretches are held back, else None."""
     if not data.inside:
         return None
     whole = dataclasses.replace(data, fitted=data.whole)

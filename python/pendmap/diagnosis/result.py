@@ -23,11 +23,12 @@ from pendmap.diagnosis.named import NamedEffect, effect_values
 from pendmap.diagnosis.table import HEAD, NOTE, Standings
 from pendmap.formatting import Estimate
 from pendmap.identification.report import in_line
-from pendmap.identification.results import ARRAYS, FitResult, Followed
+from pendmap.identification.results import FitResult, Followed
 from pendmap.model.effects import definition
 from pendmap.model.labels import unit_of
 from pendmap.model.rig import own_name
 from pendmap.records.summary import doubt_lines, finding_lines
+from pendmap.residuals.torque import OVER
 from pendmap.signal.robust import Z95
 
 if TYPE_CHECKING:
@@ -56,15 +57,6 @@ SAID: Final = {
 }
 """Meaning of each verdict, in the summary and in the report."""
 
-PLACES: Final[dict[str, str]] = {
-    "angle": "at an angle of",
-    "velocity": "at a velocity of",
-    "amplitude": "at an amplitude of",
-    "drive_phase": "at a phase of the drive of",
-    "lab_time": "at a time in the laboratory of",
-}
-"""Text before the bin of a missing torque, by quantity."""
-
 TORQUE: Final = unit_of("torque")  # Unit of a torque per moment of inertia
 WHERE: Final = 3  # Number of bins of a residual torque in the summary
 MOST_EFFECTS: Final = 3  # Default of the largest number of effects that are added
@@ -75,17 +67,6 @@ class Discrepancy(FitResult):
     """Result of a diagnosis: where a model and records disagree, and why."""
 
     KIND: ClassVar[str] = "diagnosis"
-    ARRAYS = ARRAYS | {
-        "Forecast.horizon": ("bin", "s", "middle of a bin of the horizon"),
-        "Forecast.before": ("bin", "rad", "rms error of the baseline, modulo a turn"),
-        "Forecast.after": ("bin", "rad", "rms error of the selected model, modulo a turn"),
-        "ResidualNoise.laws": {
-            "level": ("law", "1", "level of the noise by a law"),
-            "probability": ("law", "1", "probability of a law"),
-        },
-        "Scores.gram": ("response response_2", "1", "product of two unit responses"),
-        "Scores.pull": ("response", "1", "product of a unit response with the residuals"),
-    }
 
     data: DataSplit  # The records: fitted and held back
     base: ScoredModel  # The baseline
@@ -331,8 +312,9 @@ def as_text(result: Discrepancy) -> Iterator[str]:
     yield from _remarks(result)
     for row in result.clearest[:WHERE]:
         what = "torque along the motion" if row["along_motion"] else "torque"
+        at = " ".join(OVER[row["over"]][:2])
         yield (
-            f"Where: a {what} of {row['torque']:.3g} {TORQUE} is missing {PLACES[row['over']]} "
+            f"Where: a {what} of {row['torque']:.3g} {TORQUE} is missing at {at} of "
             f"{row['from']:.3g} to {row['to']:.3g} {row['unit']} ({row['z']:.1f} standard errors)"
         )
     if result.advice.next_experiment is not None:

@@ -124,10 +124,7 @@ def disguises(state: State, reduced: FittedModel, full: FittedModel) -> list[int
 
 
 def _promising(state: State, fitted: FittedModel) -> tuple[list[list[int]], list[list[int]]]:
-    """Return the candidates, and pairs of them, with the greatest scores at a model.
-
-    They are twice as many as are fitted: some have no fit within physical limits.
-    """
+    """Return the candidates, and pairs, of greatest score: twice as many as are fitted."""
     limits = state.thresholds
     scores = state.scores(fitted)
     ranked = scores.best()

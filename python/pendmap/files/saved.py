@@ -15,6 +15,7 @@ import xarray as xr
 
 from pendmap import _core
 from pendmap.errors import InputError, short_repr
+from pendmap.files.toml import packaged
 from pendmap.files.variables import CONVENTIONS, FORMAT_VERSION, flag, variable
 from pendmap.formatting import Readable
 
@@ -22,9 +23,13 @@ if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import NDArray
 
-    About = tuple[str, str, str] | Mapping[str, tuple[str, str, str]]
+    About = list[str] | dict[str, list[str]]
     """Dimensions (separated by spaces), unit and meaning of arrays; by name, of a matrix's rows."""
 
+_TABLES: Final = packaged("files/saved.toml")
+COLUMNS: Final[dict[str, dict[str, str]]] = _TABLES["columns"]
+"""Meaning of the columns of a table, by the dimension of its rows."""
+_ARRAYS: Final[dict[str, About]] = _TABLES["arrays"]  # that become variables, by class and field
 _PACKAGE: Final = "pendmap."  # Beginning of the modules whose classes a file may name
 _LEFT_OUT: Final = {"experiment", "data", "joint", "fit"}  # Fields that names of variables lack
 _PLAIN: Final[dict[str, Any]] = {"dict": dict, "list": list, "tuple": tuple, "Path": Path}
@@ -35,8 +40,6 @@ class Saved(Readable):
 
     KIND: ClassVar[str]  # Its kind in files
     ROWS: ClassVar[str]  # The dimension of its table in files
-    COLUMNS: ClassVar[Mapping[str, str]]  # Meaning of each column; units are in the column ``unit``
-    ARRAYS: ClassVar[Mapping[str, About]]  # Arrays that are variables, by class and field
 
     @abc.abstractmethod
     def to_dataframe(self) -> pd.DataFrame:
@@ -53,7 +56,7 @@ class Saved(Readable):
         statistics by name; those of several runs stand one after the other along one dimension. The
         attribute ``content`` is JSON of all that is no array.
         """
-        packed, further = _Packed(self.ARRAYS), self.further()
+        packed, further = _Packed(), self.further()
         attributes = {
             "Conventions": CONVENTIONS,
             "kind": self.KIND,
@@ -69,17 +72,16 @@ class Saved(Readable):
         for name, column in table.items() if len(table) else ():
             values = column.to_numpy()
             values = values if values.dtype.kind in "biuf" else values.astype(str)
-            data[str(name)] = variable(self.ROWS, values, "", self.COLUMNS[str(name)])
+            data[str(name)] = variable(self.ROWS, values, "", COLUMNS[self.ROWS][str(name)])
         return xr.Dataset(data, attrs=attributes)
 
 
 class _Packed:
     """Parts of a result as JSON, and their arrays by the names of variables."""
 
-    def __init__(self, table: Mapping[str, About]) -> None:
-        self._table = table  # what arrays become variables, by ``Class.field``
+    def __init__(self) -> None:
         self._arrays: dict[str, list[tuple[str, NDArray[Any]]]] = {}  # each with its run's name
-        self._about: dict[str, tuple[str, str, str]] = {}
+        self._about: dict[str, list[str]] = {}
         self._seen: dict[int, Any] = {}  # parts with their numbers, so that no id is used twice
 
     def plain(  # noqa: C901 (a branch a type)
@@ -113,7 +115,7 @@ class _Packed:
         elif dataclasses.is_dataclass(value) and type(value).__module__.startswith(_PACKAGE):
             kind = f"{type(value).__module__}:{type(value).__qualname__}"
             for name, part in vars(value).items():
-                described = self._table.get(f"{type(value).__name__}.{name}")
+                described = _ARRAYS.get(f"{type(value).__name__}.{name}")
                 of.append([name, self.plain(part, (*path, name), label, described)])
         else:
             raise InputError(f"a result with {short_repr(value)} cannot be saved")
@@ -128,7 +130,7 @@ class _Packed:
             of = [self._array(row, (*path, name), label, one) for row, (name, one) in rows]
             return {"is": "rows", "of": of}
         node = {"is": "array", "shape": list(value.shape), "dtype": value.dtype.str}
-        if not isinstance(about, tuple) or not value.size:
+        if not isinstance(about, list) or not value.size:
             return {**node, "of": value.ravel().tolist()}
         name = "_".join(part for part in path if part not in _LEFT_OUT)
         self._about[name] = about

@@ -6,6 +6,7 @@ import os
 import re
 import tomllib
 from collections.abc import Mapping
+from importlib import resources
 from typing import Any, Final
 
 import tomli_w
@@ -29,6 +30,11 @@ def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
     except (ValueError, RecursionError) as error:  # too many digits are a ValueError
         reason = "it is no text" if isinstance(error, UnicodeDecodeError) else error
         raise InputError(f"{os.fspath(path)}: not a TOML file: {reason}") from None
+
+
+def packaged(path: str) -> dict[str, Any]:
+    """Return the content of a TOML file of this package, like ``tables/words.toml``."""
+    return tomllib.loads(resources.files("pendmap").joinpath(path).read_text("utf-8"))
 
 
 def toml_text(content: Mapping[str, Any]) -> str:

@@ -2,24 +2,14 @@
 
 from __future__ import annotations
 
-from pendmap.formatting import Estimate
-from pendmap.identification.experiment import identified_model, identify
-from pendmap.identification.methods.base import Identification
-from pendmap.identification.methods.registry import METHODS
-from pendmap.identification.peaks import Peaks, find_peaks
-from pendmap.identification.report import IdentificationReport
-from pendmap.identification.table1 import PeakErrors, Table1, table1
-
-__all__ = [
-    "METHODS",
-    "Estimate",
-    "Identification",
-    "IdentificationReport",
-    "PeakErrors",
-    "Peaks",
-    "Table1",
-    "find_peaks",
-    "identified_model",
-    "identify",
-    "table1",
-]
+from pendmap.formatting import Estimate as Estimate
+from pendmap.identification.experiment import identified_model as identified_model
+from pendmap.identification.experiment import identify as identify
+from pendmap.identification.methods.base import Identification as Identification
+from pendmap.identification.methods.registry import METHODS as METHODS
+from pendmap.identification.peaks import Peaks as Peaks
+from pendmap.identification.peaks import find_peaks as find_peaks
+from pendmap.identification.report import IdentificationReport as IdentificationReport
+from pendmap.identification.table1 import PeakErrors as PeakErrors
+from pendmap.identification.table1 import Table1 as Table1
+from pendmap.identification.table1 import table1 as table1

@@ -188,10 +188,7 @@ def identify(  # noqa: PLR0913 (each is asked for by name)
 
 
 def _with_drag(joint: JointFit) -> JointFit | None:
-    """Return a fit with quadratic drag if the fit without it is poor and this closes its gap.
-
-    The squared residual beyond the noise must be at most half of that without it.
-    """
+    """Return a fit with quadratic drag if the fit without it is poor and this closes its gap."""
     noise = float(np.mean([np.mean(reading.each) for reading in joint.readings]))
     if joint.added or joint.fit.rms < MISSES * noise:
         return None

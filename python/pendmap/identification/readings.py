@@ -108,10 +108,7 @@ def _noise_of_swings(time: Floats, theta: Floats, sigma: float) -> float:
 
 
 def as_fit_run(run: Run, reading: Reading) -> FitRun:
-    """Return a run in the format of a fit.
-
-    Times are relative to the first sample, except under a drive, for its phase.
-    """
+    """Return a run in the format of a fit, in times from the first sample except under a drive."""
     time, first = from_first(run.time) if run.drive is None else (run.time, 0.0)
     pivot, gyro = None, run.gyroscope
     if run.pivot is not None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import abc
 import dataclasses
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol
 
 import numpy as np
 import pandas as pd
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from pendmap.files.saved import About
     from pendmap.formatting import Estimate
     from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.runs import FitRun
@@ -49,61 +48,10 @@ class Followed(NamedTuple):
     runs: Sequence[Run]  # the records of each
 
 
-OF_MODEL: Final = {
-    "theta": ("reading", "rad", "angle of the model"),
-    "velocity": ("reading", "rad/s", "velocity of the model"),
-}
-ARRAYS: Final[dict[str, About]] = {
-    "Run.time": ("sample", "s", "time of a sample"),
-    "Run.theta": ("sample", "rad", "angle from the downward rest, unwrapped"),
-    "Run.trusted": ("sample", "", "whether a sample is for fitting"),
-    "Run.velocity": ("sample", "rad/s", "measured velocity"),
-    "Run.acceleration": ("sample", "m/s2", "measured acceleration"),
-    "Run.pivot": ("sample", "1", "recorded motion of the pivot, in the unit of its run"),
-    "Pivot.time": ("pivot_sample", "s", "time of a sample of the pivot"),
-    "Pivot.vertical": ("pivot_sample", "1", "motion of the pivot upward, in its unit"),
-    "Pivot.horizontal": ("pivot_sample", "1", "its motion toward positive theta"),
-    "RodSensor.angle": ("reading", "rad", "initial guess of the angle"),
-    "FitRun.time": ("reading", "s", "time of a reading; the phase of the drive is that at 0"),
-    "FitRun.theta": ("reading", "rad", "reading, unwrapped; of a rod sensor over its gain"),
-    "FitRun.sigma": ("reading", "rad", "standard error of a reading"),
-    "FitRun.trusted": ("reading", "", "whether a reading is included"),
-    "Reading.each": ("recorded", "rad", "standard error of a reading"),
-    "Reading.shift": ("recorded", "rad", "bias by timing jitter, subtracted"),
-    "TrajectoryFit.curves": OF_MODEL,
-    "TrajectoryFit.residuals": ("reading", "rad", "reading less model; 0 if excluded"),
-    "TrajectoryFit.white": ("reading", "1", "residual of unit variance"),
-    "Peaks.time": ("peak", "s", "time of a peak"),
-    "Peaks.amplitude": ("peak", "rad", "angle of a peak"),
-    "Peaks.stderr_time": ("peak", "s", "standard error of the time"),
-    "Peaks.stderr_amplitude": ("peak", "rad", "standard error of the angle"),
-    "Peaks.index": ("peak", "1", "number of a peak"),
-    "Peaks.crossing_time": ("crossing", "s", "time of a zero crossing"),
-    "Peaks.crossing_stderr": ("crossing", "s", "standard error of this time"),
-    "Peaks.crossing_index": ("crossing", "1", "number of its half cycle"),
-    "PeakErrors.period_time": ("cycle", "s", "start of a full cycle"),
-    "PeakErrors.period": ("cycle", "s", "measured period of a full cycle"),
-    "PeakErrors.period_error": ("cycle", "percent", "error of a simulated period"),
-    "PeakErrors.peak_index": ("simulated_peak", "1", "number of a peak"),
-    "PeakErrors.peak": ("simulated_peak", "rad", "measured amplitude of a peak"),
-    "PeakErrors.peak_error": ("simulated_peak", "percent", "error of a simulated peak"),
-}
-"""Dimension, unit and meaning of the arrays of records and fits, by class and field."""
-
-
 class Parameters(Saved):
     """A result with parameters, which a file can hold."""
 
-    ARRAYS = ARRAYS
-    ROWS: ClassVar[str] = "parameter"
-    COLUMNS: ClassVar[Mapping[str, str]] = {
-        "parameter": "name of a parameter",
-        "value": "value of a parameter",
-        "stderr": "its standard error",
-        "low": "lower end of its 95 % interval",
-        "high": "upper end of its 95 % interval",
-        "unit": "unit of a parameter, SI; empty for a pure number",
-    }
+    ROWS = "parameter"
 
     @property
     @abc.abstractmethod

@@ -120,10 +120,7 @@ def simulated_peaks(rig: Rig, start: State, until: float) -> tuple[Floats, Float
 
 
 def peak_errors(identification: Identification, peaks: Peaks, start: State) -> PeakErrors:
-    """Return the errors of a model's simulation from ``start``, the first of ``peaks``.
-
-    The identified zero error is subtracted from the recorded ``start``.
-    """
+    """Return the errors of a simulation from ``start``, which has the sensor's zero error."""
     turned = peaks.turned
     origin = dataclasses.replace(start, theta=start.theta - identification.zero)
     span = float(turned.time[-1]) - start.time

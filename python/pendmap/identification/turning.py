@@ -36,10 +36,7 @@ class Outline:
 
 
 def outline(time: Floats, theta: Floats, sigma: float) -> Outline | None:
-    """Return the turns of a record by hysteresis, first of the raw, then of the smoothed angle.
-
-    Returns None for fewer than two turns.
-    """
+    """Return the turns by hysteresis, of the raw, then the smoothed angle; None for one or none."""
     if time.size < _FEWEST:
         return None
     # The median of five neighbours removes outliers and keeps monotone runs.

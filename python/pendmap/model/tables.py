@@ -136,10 +136,7 @@ def effects_in(content: Mapping[str, Any]) -> tuple[Effect, ...]:
 
 
 def model_text(model: Any) -> str:  # noqa: ANN401 (a Pendulum or a Rig)
-    """Return the text of a model file, which reads back as the same model.
-
-    Raises TypeError or ValueError for notes that a file cannot hold.
-    """
+    """Return the text of a model file; TypeError or ValueError for notes it cannot hold."""
     numbers = {name: getattr(model, name) for name in model.numbers()}
     if numbers.get("Omega") == 0:
         del numbers["Omega"]  # nothing is driven

@@ -243,10 +243,7 @@ def fit_with_stride(
     swing: float,
     nearest: LocalFit | None,
 ) -> LocalFit | None:
-    """Return a fit of samples at least a count apart.
-
-    ``nearest`` is the fit of neighbours if sampling is slow, else None.
-    """
+    """Return a fit of samples a count apart; ``nearest`` is that of neighbours if slow."""
     most = max(int(FARTHEST / (swing * interval)), 1)
     stride = 1
     while True:

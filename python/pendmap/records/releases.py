@@ -105,10 +105,7 @@ def grown(work: Work, part: Stretch) -> list[Stretch]:
 
 
 def held_short(work: Work, part: Stretch) -> int | None:
-    """Return the index at which a motion leaves a hold of less than a period.
-
-    Returns None if it leaves its first level as early as after a release from rest.
-    """
+    """Return where a motion leaves a hold of less than a period; None without such a hold."""
     low, high = part
     good = np.flatnonzero(work.trusted[low:high]) + low
     level = float(np.median(work.theta[low : low + 5]))

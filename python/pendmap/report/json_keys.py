@@ -7,23 +7,20 @@ are in ``json_keys.toml``.
 
 from __future__ import annotations
 
-import tomllib
-from importlib import resources
 from typing import Any, Final
 
-from pendmap.comparison.experiment import COLUMNS
+from pendmap.files.saved import COLUMNS
+from pendmap.files.toml import packaged
 from pendmap.identification.engineering import QUANTITIES
 from pendmap.model.labels import LABELS
 
 Keys = dict[str, tuple[str, str]]  # Unit and meaning by path; paths of one meaning have commas
 
-_TABLES: Final[dict[str, Any]] = tomllib.loads(
-    (resources.files("pendmap.report") / "json_keys.toml").read_text(encoding="utf-8")
-)
+_TABLES: Final = packaged("report/json_keys.toml")
 _UNITS: Final = {"chance": "1", "error_percent": "percent", "quantity": "", "unit": ""}
 _TABLES["groups"]["QUANTITY"] = {
     name: (_UNITS.get(name, "that of unit"), text)
-    for name, text in COLUMNS.items()
+    for name, text in COLUMNS["row"].items()
     if name != "run"
 }
 

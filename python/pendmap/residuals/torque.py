@@ -38,13 +38,13 @@ if TYPE_CHECKING:
 
 
 OVER: Final = {
-    "angle": "rad",
-    "velocity": "rad/s",
-    "amplitude": "rad",
-    "drive_phase": "rad",
-    "lab_time": "s",
+    "angle": ("an", "angle", "rad"),
+    "velocity": ("a", "velocity", "rad/s"),
+    "amplitude": ("an", "amplitude", "rad"),
+    "drive_phase": ("a", "phase of the drive", "rad"),
+    "lab_time": ("a", "time in the laboratory", "s"),
 }
-"""Quantities against which the torque is computed, with their units."""
+"""Quantities against which the torque is computed: article and name in texts, and unit."""
 ALONG: Final = ("amplitude", "lab_time")
 """Quantities with the torque along the motion, positive if it adds energy."""
 ROW: Final = ("from", "to", "torque", "stderr")  # Keys of the numbers of a bin
@@ -106,7 +106,7 @@ def residual_torque(runs: Sequence[FitRun], fit: TrajectoryFit, noise: ResidualN
         rest = _without_own(name, every[:, part], places, drag=drag)
         errors = np.sqrt(np.maximum(np.diag(rest @ covariance[part, part] @ rest), 0.0))
         values = np.stack((lows, highs, rest @ torques[part], errors), axis=1).tolist()
-        about: dict[str, Any] = {"over": name, "unit": OVER[name], "along_motion": name in ALONG}
+        about: dict[str, Any] = {"over": name, "unit": OVER[name][2], "along_motion": name in ALONG}
         for ends_and_torque in values:
             row = about | dict(zip(ROW, ends_and_torque, strict=True))
             rows[name].append(row | {"z": row["torque"] / row["stderr"] if row["stderr"] else 0.0})
@@ -126,10 +126,7 @@ def window_derivatives(
 def project_out(
     runs: Sequence[FitRun], windows: Sequence[WindowSlopes], columns: Sequence[Floats]
 ) -> tuple[Floats, Floats]:
-    """Return columns and residuals projected orthogonally to parameters and initial states.
-
-    Excluded samples are set to 0, also in ``windows``.
-    """
+    """Return columns and residuals orthogonal to parameters and states; excluded samples are 0."""
     parts = []
     for window, part in zip(windows, columns, strict=True):
         lost = ~runs[window.run].counted[window.first : window.first + len(window.residual)]
@@ -229,11 +226,7 @@ def responses(run: FitRun, window: WindowSlopes, torques: Floats) -> Floats:
 
 
 def _solved(columns: Floats, residual: Floats) -> tuple[Floats, Floats, tuple[float, int]]:
-    """Return the least-squares torques of bins, of least norm if they are not unique.
-
-    Further results: their covariance for a noise level of 1; the decrease of the sum of squares and
-    the number of determined combinations of bins.
-    """
+    """Return torques of least norm, covariance for noise 1, fall of the squares, and rank."""
     gram = columns.T @ columns
     scale = np.sqrt(np.diag(gram))
     scale[scale == 0] = 1.0

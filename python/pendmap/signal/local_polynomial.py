@@ -113,10 +113,7 @@ def even_weights(degree: int, points: int) -> tuple[Floats, Floats]:
 
 
 def _uneven(lag: Floats, theta: Floats, degree: int) -> tuple[Floats, Floats, Floats]:
-    """Return residual over its gain, slope at lag 0 and the slope's error for unit noise.
-
-    ``lag`` and ``theta`` are those of the samples of each window, shape (M, points).
-    """
+    """Return residual over gain, slope at lag 0 and its error, of windows, shape (M, points)."""
     half = theta.shape[1] // 2
     width = np.maximum(np.max(np.abs(lag), axis=1), 1e-12)
     x = lag / width[:, None]

@@ -28,10 +28,7 @@ def normal_scale(values: Floats) -> float:
 
 
 def broad_scale(sizes: Floats) -> float:
-    """Return a robust standard deviation from absolute values with long tails.
-
-    It is the larger of the estimates from the median and from the 80 % quantile.
-    """
+    """Return the greater robust standard deviation by the median and by the 80 % quantile."""
     if not sizes.size:
         return 0.0
     half, most = np.quantile(sizes, [0.5, 0.8])

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import tomllib
-from importlib import resources
+
+from pendmap.files.toml import packaged
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,8 +37,7 @@ class Finding:
 @functools.cache
 def texts() -> dict[str, tuple[str, bool]]:
     """Return the text of each finding, and whether the record is corrected."""
-    content = resources.files("pendmap.tables").joinpath("findings.toml").read_text("utf-8")
-    tables = tomllib.loads(content).items()
+    tables = packaged("tables/findings.toml").items()
     return {key: (text, kind == "mended") for kind, table in tables for key, text in table.items()}
 
 

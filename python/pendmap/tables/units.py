@@ -5,31 +5,20 @@ from __future__ import annotations
 import dataclasses
 import functools
 import re
-import tomllib
 import unicodedata
-from importlib import resources
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from pendmap.errors import InputError
+from pendmap.files.toml import packaged
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
-# Units of a recorded pivot: the SI unit and the factor to it
-PIVOT_UNITS: Final = {
-    "m/s2": ("m/s2", 1.0),
-    "g": ("m/s2", 9.80665),
-    "m/s": ("m/s", 1.0),
-    "m": ("m", 1.0),
-    "cm": ("m", 1e-2),
-    "mm": ("m", 1e-3),
-}
-_TABLES: Final[dict[str, Any]] = tomllib.loads(
-    resources.files("pendmap.tables").joinpath("words.toml").read_text("utf-8")
-)
+_TABLES: Final = packaged("tables/words.toml")
 TIMES: Final[dict[str, float]] = _TABLES["time"]
 ANGLES: Final[dict[str, float]] = _TABLES["angle"]
 LENGTHS: Final[dict[str, float]] = _TABLES["length"]
+PIVOT_UNITS: Final = {unit: (si, factor) for unit, (si, factor) in _TABLES["pivot"].items()}
 RAW: Final = frozenset(_TABLES["raw"])
 DEGREE: Final = ANGLES["deg"]
 SPEEDS: Final = {f"{a}/{t}": ANGLES[a] / TIMES[t] for t in ("s", "min") for a in ANGLES}

@@ -14,38 +14,24 @@ from typing import Any
 import xarray as xr
 
 from pendmap.charts import registry
-from pendmap.errors import InputError, MissingExtraError, ViewerError, short_repr
+from pendmap.errors import InputError, MissingExtraError, short_repr
+from pendmap.errors import ViewerError as ViewerError
 
 try:
     from pendmap.viewer import chart, recording
-    from pendmap.viewer.live import ADDRESS, Live, NobodyListensError, check_address
-    from pendmap.viewer.recording import SUFFIXES
-    from pendmap.viewer.window import (
-        NoDisplayError,
-        NotARecordingError,
-        RecordingNotFoundError,
-        check_display,
-        open_viewer,
-    )
+    from pendmap.viewer.live import ADDRESS as ADDRESS
+    from pendmap.viewer.live import Live as Live
+    from pendmap.viewer.live import NobodyListensError as NobodyListensError
+    from pendmap.viewer.live import check_address as check_address
+    from pendmap.viewer.recording import SUFFIXES as SUFFIXES
+    from pendmap.viewer.window import NoDisplayError as NoDisplayError
+    from pendmap.viewer.window import NotARecordingError as NotARecordingError
+    from pendmap.viewer.window import RecordingNotFoundError as RecordingNotFoundError
+    from pendmap.viewer.window import check_display as check_display
+    from pendmap.viewer.window import open_viewer as open_viewer
 except ModuleNotFoundError as error:
     text = f"recordings and the viewer need the extra pendmap[viewer] ({error})"
     raise MissingExtraError(text) from error
-
-__all__ = [
-    "ADDRESS",
-    "SUFFIXES",
-    "Live",
-    "NoDisplayError",
-    "NobodyListensError",
-    "NotARecordingError",
-    "RecordingNotFoundError",
-    "ViewerError",
-    "check_address",
-    "check_display",
-    "open_viewer",
-    "record",
-    "view",
-]
 
 
 def record(

@@ -44,10 +44,7 @@ APART: Final = 2.5  # Distance between two pivots, arm lengths
 
 @dataclass(frozen=True)
 class Motion:
-    """A record and its models, in s and rad; a row of NaN marks a gap.
-
-    ``models`` have a look and angles; ``sigma`` is the noise of a reading.
-    """
+    """A record and its models (look and angles), in s and rad; a row of NaN marks a gap."""
 
     name: str
     time: Floats

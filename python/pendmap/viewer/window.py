@@ -62,10 +62,7 @@ def open_viewer(path: str | os.PathLike[str]) -> int:
 
 
 def check_display(file: Path | None = None) -> None:
-    """Raise an error if no window can be opened: without a display or the viewer.
-
-    Whether a display responds is known only when the viewer starts.
-    """
+    """Raise an error without display or viewer; only its start shows whether a display responds."""
     names = ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET")
     if sys.platform.startswith("linux") and not any(os.environ.get(name) for name in names):
         raise _no_display("there is no display (DISPLAY is not set)", file)

@@ -81,10 +81,7 @@ class Event:
 
 
 class Path:
-    """Angle and velocity of one run at any time: a polynomial for each integration step.
-
-    ``lab`` is the lab time at which the run begins, s.
-    """
+    """Angle and velocity of a run begun at ``lab``, s, at any time: a polynomial for each step."""
 
     def __init__(self, lab: float = 0.0) -> None:
         self.lab = lab

@@ -37,10 +37,7 @@ _SAME = {"c_over_m": "gamma", "Tr": "theta_r", "stroke_mm": "p", "frequency_hz":
 
 
 def varied_model_options(function: Command, *, ends: bool = False) -> Command:
-    """Add the options of the model; ranges among them become ``ranges``, in the order typed.
-
-    Ranges are values, or two ``ends`` alone.
-    """
+    """Add the model's options; ranges, or two ``ends``, become ``ranges``, in the order typed."""
 
     @functools.wraps(function)
     def with_ranges(**given: Any) -> Any:  # noqa: ANN401 (as the command)

@@ -28,10 +28,7 @@ _WITH_PI = re.compile(r"([+-]?)(\d*\.?\d*(?:e[+-]?\d+)?)\*?pi(?:/(\d+\.?\d*))?",
 
 
 class OptionType(click.ParamType[T]):
-    """Type of an option, from its name and a function that reads a text or raises InputError.
-
-    ``known`` returns the values that a shell completes.
-    """
+    """Type of an option: a function that reads a text, and known values for a shell."""
 
     def __init__(
         self, name: str, read: Callable[[str], T], known: Callable[[], Iterable[str]] | None = None

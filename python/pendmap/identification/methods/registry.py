@@ -47,10 +47,7 @@ def check_names(methods: Iterable[str] | None) -> list[str]:
 def apply_method(
     name: str, peaks: Peaks, record: tuple[Floats, Floats] | None = None
 ) -> Identification:
-    """Return the result of a method for the peaks of a free decay, also an inapplicable one.
-
-    ``record`` are the samples of the decay, s and rad, if there are any.
-    """
+    """Return a method's result for the peaks, and samples (s, rad) if any, of a free decay."""
     if peaks.lacking:
         result = inapplicable(peaks.lacking)
     elif name == "energy_balance" and record is not None:
@@ -61,11 +58,7 @@ def apply_method(
 
 
 def identify_peaks(peaks: Peaks, names: Iterable[str]) -> dict[str, Identification]:
-    """Identify damping from measured peaks alone.
-
-    Standard errors of peaks are estimated from their scatter; with too few peaks there are none,
-    and no intervals.
-    """
+    """Identify damping from peaks alone, with errors by their scatter, or none for too few."""
     size = peaks.time.shape
     peaks = dataclasses.replace(
         peaks.later(-float(peaks.time[0])) if len(peaks) else peaks,
