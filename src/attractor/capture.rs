@@ -304,10 +304,10 @@ impl Job for Heights<'_> {
     type Output = f64;
     #[inline(always)]
     fn run<S: Isa>(self, isa: S) -> f64 {
-        if self.height.len() == S::Few::WIDTH {
-            self.of::<S::Few>(isa)
-        } else {
+        if self.height.len().is_multiple_of(S::Lanes::WIDTH) {
             self.of::<S::Lanes>(isa)
+        } else {
+            self.of::<S::Few>(isa)
         }
     }
 }

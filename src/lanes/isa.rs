@@ -11,9 +11,9 @@ pub trait Isa: Simd {
     const FUSED: bool;
     /// Lanes of a bundle: enough registers to hide the latency of one.
     type Lanes: Lane<Token = Self>;
-    /// Lanes of numbers with a derivative, which need twice the registers.
+    /// Lanes of what needs more registers: events and effects.
     type Narrow: Lane<Token = Self>;
-    /// Lanes of a small bundle, for a handful of trajectories.
+    /// Lanes of a small bundle, for a handful of trajectories, and for numbers with a derivative.
     type Few: Lane<Token = Self>;
     /// One trajectory with the same arithmetic, bit for bit.
     type Single: Lane<Token = ()>;

@@ -129,7 +129,7 @@ pub fn find_others(
             apart.push((point, n));
         }
     }
-    apart.into_iter().filter_map(|closed| orbit_of(map, closed, reach)).collect()
+    orbits_of(map, &apart, reach).into_iter().flatten().collect()
 }
 
 /// [`find`] from each of several starts with its own period.
@@ -139,22 +139,33 @@ pub fn find_each(
     starts: &[(State, usize)],
     reach: f64,
 ) -> Vec<Option<PeriodicOrbit>> {
-    let points = polish(map, starts, reach, &[]).into_iter();
-    points.map(|closed| orbit_of(map, closed?, reach)).collect()
+    let points = polish(map, starts, reach, &[]);
+    let closed: Vec<_> = points.iter().flatten().copied().collect();
+    let mut orbits = orbits_of(map, &closed, reach).into_iter();
+    points.into_iter().map(|point| point.and_then(|_| orbits.next()?)).collect()
 }
 
-/// The orbit of a point that closes after `n` periods, with its smallest period.
-fn orbit_of(map: &PoincareMap, (point, n): (State, usize), reach: f64) -> Option<PeriodicOrbit> {
-    let image = |d: usize| map.iterate(point, d);
-    let smallest = (1..=n)
-        .filter(|d| n.is_multiple_of(*d))
-        .find(|d| *d == n || map.angle.distance(image(*d).state, point) < SAME_POINT)?;
-    let (point, _) = if smallest == n {
-        (point, n)
-    } else {
-        polish(map, &[(point, smallest)], reach, &[]).pop()??
+/// The orbits of points that close after some periods, with their smallest periods.
+fn orbits_of(
+    map: &PoincareMap,
+    closed: &[(State, usize)],
+    reach: f64,
+) -> Vec<Option<PeriodicOrbit>> {
+    let wrapped =
+        |&([theta, velocity], n): &(State, usize)| ([map.angle.wrapped(theta), velocity], n);
+    let firsts: Vec<(State, usize)> = closed.iter().map(wrapped).collect();
+    let orbit = |((first, n), course): (&(State, usize), Vec<Image>)| {
+        let returns = |d: &usize| map.angle.distance(course[d - 1].state, *first) < SAME_POINT;
+        let smallest = (1..*n).filter(|d| n.is_multiple_of(*d)).find(returns);
+        match smallest {
+            Some(d) => {
+                let closed = polish(map, &[(*first, d)], reach, &[]).pop()??;
+                orbits_of(map, &[closed], reach).pop()?
+            }
+            None => complete(map, *first, &course),
+        }
     };
-    complete(map, [map.angle.wrapped(point[0]), point[1]], smallest)
+    firsts.iter().zip(map.courses(&firsts)).map(orbit).collect()
 }
 
 /// The index of the point with the lowest angle.
@@ -264,15 +275,16 @@ fn repelled(angle: Angle, step: Vector2<f64>, point: State, known: &[State]) -> 
     if stretched.norm().is_finite() { stretched } else { step }
 }
 
-fn complete(map: &PoincareMap, first: State, n: usize) -> Option<PeriodicOrbit> {
+/// The orbit from `first` on, from the images of each of its periods.
+fn complete(map: &PoincareMap, first: State, course: &[Image]) -> Option<PeriodicOrbit> {
+    let n = course.len();
     let mut points = Vec::with_capacity(n);
     let mut derivatives = Vec::with_capacity(n);
     let mut products = Vec::with_capacity(n);
     let mut travel = 0.0;
     let mut state = first;
-    for _ in 0..n {
+    for image in course {
         points.push(state);
-        let image = map.once(state);
         derivatives.push(image.derivative);
         products.push(image.product);
         // Not only by the turns removed: a point at pi may come back at -pi.

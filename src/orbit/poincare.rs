@@ -121,21 +121,30 @@ impl PoincareMap {
             derivative: Matrix2::identity(),
             product: Some(1.0),
         };
-        let mut images: Vec<Image> = starts.iter().map(at).collect();
+        let whole = |(start, course): (_, Vec<Image>)| {
+            course.into_iter().fold(at(start), |all, next| Image {
+                state: next.state,
+                turns: all.turns + next.turns,
+                derivative: next.derivative * all.derivative,
+                product: next.product.zip(all.product).map(|(a, b)| a * b),
+            })
+        };
+        starts.iter().zip(self.courses(starts)).map(whole).collect()
+    }
+
+    /// The images of each of several states after each of a number of periods, one period from one to the next.
+    #[must_use]
+    pub fn courses(&self, starts: &[(State, usize)]) -> Vec<Vec<Image>> {
+        let mut courses: Vec<Vec<Image>> = vec![Vec::new(); starts.len()];
         for period in 0..starts.iter().map(|(_, periods)| *periods).max().unwrap_or(0) {
-            let going = |image: &usize| starts[*image].1 > period;
-            let going: Vec<usize> = (0..images.len()).filter(going).collect();
-            let states: Vec<State> = going.iter().map(|k| images[*k].state).collect();
+            let going: Vec<usize> = (0..starts.len()).filter(|k| starts[*k].1 > period).collect();
+            let state = |k: &usize| courses[*k].last().map_or(starts[*k].0, |image| image.state);
+            let states: Vec<State> = going.iter().map(state).collect();
             for (k, next) in going.into_iter().zip(self.once_all(&states)) {
-                images[k] = Image {
-                    state: next.state,
-                    turns: images[k].turns + next.turns,
-                    derivative: next.derivative * images[k].derivative,
-                    product: next.product.zip(images[k].product).map(|(a, b)| a * b),
-                };
+                courses[k].push(next);
             }
         }
-        images
+        courses
     }
 }
 

@@ -8,7 +8,7 @@
 use std::f64::consts::{FRAC_1_PI, PI};
 
 use super::event::EventSearch;
-use super::runner::{run, smooth};
+use super::runner::run;
 use super::stroboscopic::Strobe;
 use crate::lanes::{Isa, Job, Lane, MAX_WIDTH, dispatch};
 use crate::model::Angle;
@@ -113,13 +113,14 @@ impl Block {
 }
 
 impl Strobe {
-    /// Number of trajectories of a block for `count` of them: one bundle of lanes, a small one for a
-    /// handful, or with events so many that those of a step fill the lanes of their queue.
+    /// Number of trajectories of a block for `count` of them: small bundles of lanes as long as these take less time
+    /// than a whole one, a whole one, or with events so many that those of a step fill the lanes of their queue.
     #[must_use]
     pub fn block_width(&self, count: usize) -> usize {
         let [few, wide, both] = dispatch::run(self.simd, Widths);
+        let small = count.max(1).next_multiple_of(few);
         match (self.is_plain(), self.events) {
-            (true, _) if count <= few => few,
+            _ if 4 * small <= 3 * wide => small,
             (true, _) => wide,
             (false, true) => count.clamp(1, WITH_EVENTS).next_multiple_of(both),
             (false, false) => both,
@@ -172,10 +173,10 @@ impl Job for Steps<'_> {
     #[inline(always)]
     fn run<S: Isa>(self, isa: S) {
         let Self { strobe, block, see } = self;
-        if block.kick.len() == S::Few::WIDTH && strobe.is_plain() {
-            smooth::<S::Few>(strobe, isa, block, see);
-        } else {
+        if block.kick.len().is_multiple_of(S::Lanes::WIDTH) {
             run::<S::Lanes, S::Narrow>(strobe, (isa, isa), block, see);
+        } else {
+            run::<S::Few, S::Few>(strobe, (isa, isa), block, see);
         }
     }
 }

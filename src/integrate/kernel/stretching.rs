@@ -87,11 +87,7 @@ impl Job for Stretch<'_> {
     type Output = ();
     #[inline(always)]
     fn run<S: Isa>(self, isa: S) {
-        if self.all.states.len() <= S::Few::WIDTH {
-            self.of::<S::Few>(isa);
-        } else {
-            self.of::<S::Narrow>(isa);
-        }
+        self.of::<S::Few>(isa);
     }
 }
 
