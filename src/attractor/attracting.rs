@@ -8,6 +8,9 @@ use crate::integrate::{State, Strobe};
 use crate::orbit::PoincareMap;
 use crate::orbit::newton::{self, PeriodicOrbit};
 
+/// A state at the edge of those that friction holds creeps: a multiplier is this close to 1.
+const CREEPING: f64 = 1e-7;
+
 /// Points of similar orbits of similar pendulums, the most similar first, and their period.
 pub type Alike = (Vec<State>, usize);
 
@@ -35,10 +38,11 @@ pub fn attracting(
     found
 }
 
-/// Whether an orbit is stable, and none of its points one that friction holds for ever.
+/// Whether an orbit is stable, and none of its points one that friction holds for ever, or on the edge of these.
 fn attracts(strobe: &Strobe, orbit: &PeriodicOrbit) -> bool {
     let held = |p: &State| p[1] == 0.0 && strobe.equation.holds_for_ever(p[0]);
-    orbit.is_stable() && !(strobe.friction && orbit.points.iter().any(held))
+    let creeps = || orbit.multipliers.largest() > 1.0 - CREEPING || orbit.points.iter().any(held);
+    orbit.is_stable() && !(strobe.friction && creeps())
 }
 
 impl Catalogue {

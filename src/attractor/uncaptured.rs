@@ -6,6 +6,7 @@ use super::capture::{self, Fate};
 use super::chaos::{self, ChaoticSet, spread};
 use super::find::{Catalogue, Ending, open};
 use super::kind::Kind;
+use super::near_returns::tracks;
 use crate::error::Error;
 use crate::integrate::{State, Strobe};
 
@@ -62,7 +63,8 @@ impl Catalogue {
         if runs.iter().all(|run| run.fate != Fate::Open) {
             return Ok(());
         }
-        if self.find_cycles(strobe, &self.effort.map(strobe), &open(endings), cancel)? {
+        let tracks = tracks(strobe, &open(endings), self.effort.longest_cycle);
+        if self.find_cycles(strobe, &self.effort.map(strobe), &tracks, cancel)? {
             // They have settled by now.
             return self.observe(strobe, endings, bound, cancel);
         }
@@ -72,7 +74,7 @@ impl Catalogue {
                 .filter(|new| !self.sets.iter().any(|old| old.same_as(new)))
                 .collect();
         if new.is_empty() {
-            return Ok(());
+            return self.follow(strobe, endings, bound, cancel);
         }
         let points: Vec<State> = new.iter().flat_map(|set| set.points.iter().copied()).collect();
         if self.find_short_cycles(strobe, &points, cancel)? {
@@ -80,6 +82,7 @@ impl Catalogue {
             return self.observe(strobe, endings, bound, cancel);
         }
         let symmetric = strobe.pendulum.is_mirror_symmetric();
+        let known = self.sets.len();
         for set in new {
             if self.sets.iter().any(|old| old.same_as(&set))
                 || !self.stays(strobe, &set, length, cancel)?
@@ -92,8 +95,24 @@ impl Catalogue {
             }
             self.sets.push(set);
         }
+        if self.sets.len() == known {
+            return self.follow(strobe, endings, bound, cancel);
+        }
         self.rebuild(&strobe.pendulum);
         Ok(())
+    }
+
+    /// Runs what was observed and is not chaotic for as long as [`Effort::followed`] says: long transients end.
+    fn follow(
+        &mut self,
+        strobe: &Strobe,
+        endings: &mut [Ending],
+        bound: u32,
+        cancel: &AtomicBool,
+    ) -> Result<(), Error> {
+        let (elapsed, length) =
+            (bound + self.effort.observation * bound, self.effort.followed * bound);
+        self.run(strobe, endings, length, elapsed, elapsed + length, cancel)
     }
 
     /// Quasi-periodic rotations among the sets of a similar pendulum: runs from their points, observed for twice
