@@ -24,8 +24,6 @@ pub struct Effort {
     pub observed_alone: usize,
     /// Uncaptured trajectories are observed for this multiple of the first bound.
     pub observation: u32,
-    /// If none of them is chaotic, they are followed for this further multiple.
-    pub followed: u32,
     /// Runs that a chaotic set requires; if fewer have reached it, more runs from its points must
     /// stay.
     pub proved: usize,
@@ -75,7 +73,6 @@ impl Effort {
         observed: 256,
         observed_alone: 256,
         observation: 4,
-        followed: 0,
         proved: 16,
         exponents: 256,
         cells: 96,
@@ -99,8 +96,7 @@ impl Effort {
         tries: 6,
         observed: 24,
         observed_alone: 24,
-        observation: 2,
-        followed: 2,
+        observation: 4,
         proved: 16,
         exponents: 16,
         cells: 24,

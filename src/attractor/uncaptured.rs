@@ -74,7 +74,7 @@ impl Catalogue {
                 .filter(|new| !self.sets.iter().any(|old| old.same_as(new)))
                 .collect();
         if new.is_empty() {
-            return self.follow(strobe, endings, bound, cancel);
+            return Ok(());
         }
         let points: Vec<State> = new.iter().flat_map(|set| set.points.iter().copied()).collect();
         if self.find_short_cycles(strobe, &points, cancel)? {
@@ -82,7 +82,6 @@ impl Catalogue {
             return self.observe(strobe, endings, bound, cancel);
         }
         let symmetric = strobe.pendulum.is_mirror_symmetric();
-        let known = self.sets.len();
         for set in new {
             if self.sets.iter().any(|old| old.same_as(&set))
                 || !self.stays(strobe, &set, length, cancel)?
@@ -95,24 +94,8 @@ impl Catalogue {
             }
             self.sets.push(set);
         }
-        if self.sets.len() == known {
-            return self.follow(strobe, endings, bound, cancel);
-        }
         self.rebuild(&strobe.pendulum);
         Ok(())
-    }
-
-    /// Runs what was observed and is not chaotic for as long as [`Effort::followed`] says: long transients end.
-    fn follow(
-        &mut self,
-        strobe: &Strobe,
-        endings: &mut [Ending],
-        bound: u32,
-        cancel: &AtomicBool,
-    ) -> Result<(), Error> {
-        let (elapsed, length) =
-            (bound + self.effort.observation * bound, self.effort.followed * bound);
-        self.run(strobe, endings, length, elapsed, elapsed + length, cancel)
     }
 
     /// Quasi-periodic rotations among the sets of a similar pendulum: runs from their points, observed for twice

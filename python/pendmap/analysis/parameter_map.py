@@ -105,7 +105,7 @@ def parameter_map(  # noqa: PLR0913 (physics first, numerical choices by name)
     followed, and the result does not depend on the order of the work.
 
     Trajectories run until a stable orbit, found by Newton's method, has captured them. Those not
-    captured are followed twice as long again, in four windows. A set of windows of one sense
+    captured are followed four times as long again, in four windows. A set of windows of one sense
     of rotation that no trajectory leaves, with an exponent that is positive by four standard
     errors, is chaos of its kind, unless a stable orbit of period 1 to 4 in it captures it. If the
     cell has another attractor, which could end chaos, none of 32 runs may end within 2500 periods.
