@@ -72,6 +72,14 @@ pub enum Error {
         /// Why not.
         why: &'static str,
     },
+    /// Newton's method finds no orbit from a start.
+    #[error("start must be near an orbit of period {n}, Newton's method finds none from {start:?}")]
+    NoOrbit {
+        /// The period.
+        n: usize,
+        /// The start.
+        start: [f64; 2],
+    },
     /// Arrays that belong together have different lengths.
     #[error(
         "{} and {} must be as many values, got {} and {}",

@@ -12,6 +12,7 @@
 //! | What is the equation of motion? | [`model`] |
 //! | Where is a state some time later, how precisely, for how many at once? | [`integrate`] |
 //! | Which closed orbits are there, and are they stable? | [`orbit`] |
+//! | How do they change along a parameter? | [`continuation`] |
 //! | Where do motions end, and how is that recognised? | [`attractor`] |
 //! | What does the whole plane of initial conditions do? | [`maps`] |
 //! | Which parameters does a record's pendulum have? | [`fit`] |
@@ -20,7 +21,7 @@
 //! | How far is it? | [`progress`] |
 //! | What was wrong with my request? | [`error`] |
 //!
-//! Imports run upwards in that list's reverse: `maps` -> `attractor`, `orbit` -> `integrate` ->
+//! Imports run upwards in that list's reverse: `maps` -> `attractor`, `continuation` -> `orbit` -> `integrate` ->
 //! `model` -> `lanes` -> `memory` -> `error`, and `fit` -> `integrate`. Threads live in `maps` and `fit` alone.
 //! The Python module `pendmap._core` is another crate, in `src/python`.
 //!
@@ -44,6 +45,7 @@
 //! ```
 
 pub mod attractor;
+pub mod continuation;
 pub mod error;
 pub mod fit;
 pub mod integrate;

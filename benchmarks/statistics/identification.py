@@ -24,7 +24,7 @@ import numpy as np
 from benchmarks.peers.report import machine, note, say, table
 from pendmap.identification import Estimate, Identification, Peaks, find_peaks, identify
 from pendmap.identification.methods import combined, lines
-from pendmap.identification.period import mean_period
+from pendmap.identification.peaks import mean_period
 from pendmap.identification.table1 import State, errors_of, peak_errors, simulated_peaks
 from pendmap.virtual_rig.effects.base import Drive
 from pendmap.virtual_rig.equation import Equation, Parameters

@@ -45,6 +45,7 @@ ANALYSES = {
         BARE, {"p": (0.3, 0.9, 2), "omega": (1.8, 2.0, 2)}, starts=2
     ),
     "bifurcation": lambda: pendmap.bifurcation(BARE, {"p": (0.5, 0.6, 2)}, starts=2),
+    "continuation": lambda: pendmap.continuation(BARE, {"p": (0.3, 1.5)}, 1, 1, longest=1),
     "orbits": lambda: pendmap.orbit(BARE, 2, 0, pendmap.Grid.square(20)),
     "lyapunov": lambda: pendmap.lyapunov(BARE),
     "lifetime": lambda: pendmap.lifetime(BARE, starts=100),

@@ -18,6 +18,7 @@ from pendmap import (
     Rig,
     basins,
     bifurcation,
+    continuation,
     parameter_map,
     read_experiment,
     render,
@@ -131,6 +132,8 @@ def planes() -> None:
     found = parameter_map(Pendulum(), plane, curves=True)
     render.draw(found, HERE / "plane.png", dpi=90, layer="kinds", size=(9.4, 9.4))
     render.draw(bifurcation(Pendulum(), {"p": (0.9, 2.0, 2000)}), HERE / "bifurcation.png", dpi=110)
+    branches = continuation(Pendulum(omega=1.8), {"p": (0.05, 1.3)}, n=2, longest=4)
+    render.draw(branches, HERE / "continuation.png", dpi=110)
 
 
 def in_axes() -> None:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from pendmap.analysis.basins import basins as basins
     from pendmap.analysis.basins import basins_of as basins_of
     from pendmap.analysis.bifurcation import bifurcation as bifurcation
+    from pendmap.analysis.continuation import continuation as continuation
     from pendmap.analysis.fractality import BasinEntropy as BasinEntropy
     from pendmap.analysis.fractality import UncertaintyExponent as UncertaintyExponent
     from pendmap.analysis.fractality import basin_entropy as basin_entropy
@@ -70,6 +71,7 @@ ANALYSES = {
     "basin_sweep": ("sweep", ["sweep"], "Map basins along one or two parameters."),
     "parameter_map": ("map", ["parameter_map"], "Map which attractors exist over two parameters."),
     "bifurcation": ("bifurcation", ["bifurcation"], "Draw stroboscopic points along a parameter."),
+    "continuation": ("continue", ["continuation"], "Follow periodic orbits along a parameter."),
     "orbits": ("orbit", ["orbit"], "Find all periodic orbits of one period and winding."),
     "lyapunov": ("lyapunov", ["lyapunov"], "Find the largest Lyapunov exponent of an attractor."),
     "lifetime": ("lifetime", ["lifetime"], "Measure how long transient chaos lives."),

@@ -11,6 +11,7 @@ __all__ = [
     "Attractor",
     "BasinPlan",
     "Bifurcation",
+    "Continuation",
     "CriticalAmplitudes",
     "Diverged",
     "Ensemble",
@@ -35,6 +36,7 @@ __all__ = [
     "advance",
     "bounds",
     "choose_steps",
+    "continuation",
     "counts_turns",
     "default_threads",
     "effects",
@@ -119,6 +121,27 @@ class OrbitSearch:
     orbits: list[Orbit]
     begun: int
     friction: bool
+
+@final
+class Continuation:
+    n: _Places
+    w: _Places
+    symmetric: list[bool]
+    ends: list[tuple[str, str]]
+    meets: list[tuple[int, int]]
+    twin: _Places
+    orbit_branch: _Places
+    value: _Floats
+    multipliers: _Floats
+    phases: list[str]
+    point_orbit: _Places
+    theta: _Floats
+    velocity: _Floats
+    event_kind: list[str]
+    event_orbit: _Places
+    supercritical: _Places
+    smooth: list[bool]
+    sections: list[tuple[float, int]]
 
 @final
 class Texture:
@@ -391,6 +414,15 @@ def orbits(
     threads: int,
     progress: _Progress | None = None,
 ) -> OrbitSearch: ...
+def continuation(
+    model: Pendulum,
+    along: tuple[Sequence[float], _Range],
+    winding: tuple[int, int],
+    longest: int,
+    start: tuple[float, float, float] | None,
+    threads: int,
+    progress: _Progress | None = None,
+) -> Continuation: ...
 def orbits_near(
     model: Pendulum, steps: int, states: Sequence[tuple[float, float, int, bool | None]]
 ) -> list[tuple[int, list[_Pair]] | None]: ...

@@ -169,9 +169,7 @@ impl Follow<'_> {
             let given = match rod_sensor {
                 None => [run.given(&ode, k), state[1]],
                 Some(sensor) => {
-                    let own = [number(Slot::Bias, sensor.bias), number(Slot::Tilt, sensor.tilt)];
-                    let moving = run.signs[k].map(|signs| (signs, run.past(k)));
-                    let reading = sensor.read(&ode, times[k], *state, moving, own);
+                    let reading = sensor.read(state[1], number(Slot::Bias, sensor.bias));
                     [reading, reading.like(0.0)]
                 }
             };

@@ -2,7 +2,7 @@
 //!
 //! - [`record`]: a record of one motion
 //! - [`problem`]: records, and which parameters of their pendulums are free
-//! - [`rod_sensor`]: readings of a gyroscope or an accelerometer on the rod
+//! - [`rod_sensor`]: readings of a gyroscope on the rod
 //! - [`window`]: a record divided into windows, each with its own initial state
 //! - [`quantised`]: the likelihood of readings rounded to counts
 //! - [`linear`]: residuals of a window and their derivatives

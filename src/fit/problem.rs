@@ -21,8 +21,6 @@ pub enum Slot {
     Parameter(Parameter),
     /// [`RodSensor::bias`].
     Bias,
-    /// [`RodSensor::tilt`].
-    Tilt,
 }
 
 /// A free parameter.
@@ -125,9 +123,9 @@ impl Problem {
                     let allowed = "one of those given";
                     return Err(range("record of a free parameter", index, allowed));
                 };
-                if matches!(slot, Slot::Bias | Slot::Tilt) && record.rod_sensor.is_none() {
-                    let allowed = "one with a gyroscope or an accelerometer";
-                    return Err(range("record of a bias or tilt", index, allowed));
+                if *slot == Slot::Bias && record.rod_sensor.is_none() {
+                    let allowed = "one with a gyroscope";
+                    return Err(range("record of a bias", index, allowed));
                 }
                 if let Slot::Parameter(parameter) = *slot
                     && !record.pendulum.has(parameter)
@@ -195,8 +193,11 @@ impl Problem {
             match free.slot(index) {
                 Some(Slot::Gravity) => shaped.gravity = *value,
                 Some(Slot::Parameter(parameter)) => shaped.pendulum.set(parameter, *value),
-                Some(Slot::Bias) => shaped.change(|sensor| sensor.bias = *value),
-                Some(Slot::Tilt) => shaped.change(|sensor| sensor.tilt = *value),
+                Some(Slot::Bias) => {
+                    if let Some(sensor) = &mut shaped.rod_sensor {
+                        sensor.bias = *value;
+                    }
+                }
                 None => {}
             }
         }
@@ -212,12 +213,6 @@ impl Problem {
 }
 
 impl Shaped {
-    fn change(&mut self, change: impl FnOnce(&mut RodSensor)) {
-        if let Some(sensor) = &mut self.rod_sensor {
-            change(sensor);
-        }
-    }
-
     fn is_sound(&self) -> bool {
         let parameters = self.pendulum.parameters().into_iter();
         let finite = parameters.map(|one| self.pendulum.value(one)).all(f64::is_finite);

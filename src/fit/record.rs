@@ -18,7 +18,7 @@ pub struct Record {
     pub times: Vec<f64>,
     /// Readings, rad; for a sensor on the rod in the unit of its factors.
     pub readings: Vec<f64>,
-    /// The gyroscope or accelerometer that read, where it was no sensor of the angle; of effects on
+    /// The gyroscope that read, where it was no sensor of the angle; of effects on
     /// the reading only those that multiply it act.
     pub rod_sensor: Option<RodSensor>,
     /// About which angles these were, rad, where the readings are none: initial states begin there.

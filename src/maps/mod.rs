@@ -9,6 +9,7 @@
 //!   exponents of many trajectories
 //! - [`orbits`]: all periodic orbits of one period and winding; `multistart`: starting points of
 //!   Newton's method
+//! - [`branches`]: all branches of orbits of one type along a parameter
 //! - [`parameter_map`]: the attractors over a plane of two parameters; [`survey`]: its blocks; [`cell`],
 //!   [`resolution`]: one pendulum of it, and its step length
 //! - [`bifurcation`]: the attractors along one parameter, and one followed up and down
@@ -26,6 +27,7 @@ pub mod basins;
 pub mod bifurcation;
 pub mod boundary_distance;
 pub mod bounds;
+pub mod branches;
 pub mod cell;
 mod chebyshev;
 mod continuation;

@@ -10,7 +10,7 @@ pub mod parameter;
 pub mod pendulum;
 pub mod recorded;
 pub mod rest;
-mod spline;
+pub(crate) mod spline;
 
 pub use angle::Angle;
 pub use drive::HarmonicDrive;

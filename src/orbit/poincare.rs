@@ -13,7 +13,7 @@ use crate::model::{Angle, Pendulum};
 
 /// A step short enough for errors near 1e-15 a period: the method's error falls as the eighth
 /// power, and is 1e-9 after five periods at 0.095.
-const STEP: f64 = 0.025;
+pub const STEP: f64 = 0.025;
 
 /// The map over one forcing period, at the accuracy of orbits: errors near rounding.
 #[derive(Clone, Debug)]

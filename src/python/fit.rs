@@ -27,7 +27,7 @@ const EACH_READING: usize = 40;
 type Floats<'py> = PyReadonlyArray1<'py, f64>;
 
 /// `([(record, name), ...], start)`: the name of the number in each of its records, a parameter of the
-/// pendulum, `gravity`, or `bias` or `tilt` of a sensor on the rod; where the search starts.
+/// pendulum, `gravity`, or the `bias` of a gyroscope; where the search starts.
 type FreeTuple = (Vec<(usize, String)>, f64);
 
 /// `(record, first sample, one after the last, angle, velocity)`.
@@ -60,15 +60,11 @@ impl Pivot<'_> {
     }
 }
 
-/// A sensor on the rod as Python passes it: its factors, and the approximate angles at its
-/// readings.
+/// A gyroscope on the rod as Python passes it: its factor, and the approximate angles at its readings.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct Sensor<'py> {
     rate: f64,
-    place: f64,
-    gravity: f64,
-    interval: f64,
     angle: Floats<'py>,
 }
 
@@ -91,15 +87,7 @@ impl Run<'_> {
         let recorded = self.pivot.as_ref().map(Pivot::recorded).transpose()?;
         let angles = |sensor: &Sensor<'_>| Ok::<_, PyErr>(sensor.angle.as_slice()?.to_vec());
         let angles = self.rod_sensor.as_ref().map(angles).transpose()?;
-        let rod_sensor =
-            self.rod_sensor.map(|Sensor { rate, place, gravity, interval, .. }| RodSensor {
-                rate,
-                place,
-                gravity,
-                bias: 0.0,
-                interval,
-                tilt: 0.0,
-            });
+        let rod_sensor = self.rod_sensor.map(|Sensor { rate, .. }| RodSensor { rate, bias: 0.0 });
         let weights = self.weight.as_slice()?.to_vec();
         let counts =
             self.count.map(|step| Counts::new(step, &weights)).transpose().map_err(raise)?;
@@ -139,7 +127,6 @@ fn problem(runs: Vec<Run<'_>>, free: &[FreeTuple], tolerance: f64) -> PyResult<P
         let pendulum = records.get(*record).map(|record| &record.pendulum);
         let slot = match (name.as_str(), pendulum) {
             ("bias", _) => Slot::Bias,
-            ("tilt", _) => Slot::Tilt,
             (name, Some(pendulum)) if name != "gravity" => {
                 Slot::Parameter(pendulum.parameter(name)?)
             }

@@ -3,6 +3,7 @@
 // PyO3 hands arguments over by value, and its signatures read best with the lifetime spelled out.
 #![allow(clippy::needless_pass_by_value, clippy::elidable_lifetime_names)]
 
+mod continuation;
 mod convert;
 mod exponents;
 mod fit;
@@ -103,6 +104,7 @@ mod _core {
     #[pymodule_export]
     use super::{
         Diverged, bounds,
+        continuation::{Continuation, continuation},
         convert::Attractor,
         counts_turns, default_threads,
         exponents::{Ensemble, Lyapunov, growth, lyapunov},

@@ -14,6 +14,7 @@
 //!   their bifurcations
 //! - [`traps`], [`attractors`], [`chaos`], [`special_cases`]: attractors
 //! - [`maps`], [`continued_plans`], [`finite_time`], [`uncertainty`], [`threads`]: whole planes; [`planes`]: of parameters
+//! - [`continuation`]: branches of orbits along a parameter
 //! - [`exponents`]: rates of divergence of neighbouring motions, also through friction
 //! - [`tongues`]: regions of stability of rest
 //! - [`properties`]: properties of every pendulum
@@ -23,6 +24,7 @@ mod attractors;
 mod bifurcations;
 mod chaos;
 mod chaotic_sets;
+mod continuation;
 mod continued_plans;
 mod convergence_order;
 mod corners;

@@ -17,7 +17,6 @@ from pendmap.comparison.experiment import written
 from pendmap.comparison.forced import ForcedComparison
 from pendmap.comparison.free import MODEL, RunComparison
 from pendmap.formatting import counted
-from pendmap.identification.readings import as_angles
 from pendmap.units import Units
 
 if TYPE_CHECKING:
@@ -115,21 +114,16 @@ def _free(one: RunComparison) -> list[Panel]:
 
 
 def _over_record(one: RunComparison) -> Panel:
-    run, sensor = one.run, one.run.accelerometer
-    # The model's reading; the sensor's own errors appear in the residual alone.
-    readings = run.theta if sensor is None else sensor.gain * as_angles(run)
-    angle = readings - one.residual * (1.0 if sensor is None else sensor.gain)
-    if sensor is None and run.rod_sensor is not None:  # a gyroscope reads no angle
-        angle = one.curve[0]
-    shown, made = (np.where(run.trusted, values, np.nan) for values in (readings, angle))
+    run = one.run
+    # A gyroscope reads no angle.
+    angle = run.theta - one.residual if run.gyroscope is None else one.curve[0]
+    shown, made = (np.where(run.trusted, values, np.nan) for values in (run.theta, angle))
     some = slice(None, None, max(1, run.time.size // DOTS))
     marks: list[Mark] = [
         Points(run.time[some], shown[some], colour=MEASURED, size=1.5, name="record"),
         Line(run.time[some], made[some], colour=look(MODEL).colour, width=0.7, name="model"),
     ]
     up = names.angle(holding(shown))
-    if sensor is not None:
-        up = Axis(f"acceleration ({sensor.unit.replace('s2', 's²')})", holding(shown))
     return Panel("record", "record and model", names.seconds(run.time), up, marks)
 
 

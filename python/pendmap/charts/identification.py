@@ -53,7 +53,7 @@ def sheet(report: IdentificationReport) -> Chart:
     whole = dataclasses.replace(history(run), name="record", title="record")
     rows = [[whole], [_envelope_of_fit(report)]]
     if joint is not None:
-        gain = 1.0 if run.rod_sensor is None else run.rod_sensor.gain
+        gain = 1.0 if run.gyroscope is None else run.gyroscope.w0
         read = gain * joint.given[0].theta
         left, sigma = joint.fit.residuals[0], joint.readings[0].sigma
         below = residuals(run, left, sigma, BEST, "residual: record less fit")
@@ -69,12 +69,12 @@ def sheet(report: IdentificationReport) -> Chart:
 
 def _close(run: Run, fit: TrajectoryFit, read: Floats, made: Floats) -> Panel:
     """Return the readings of the first swings, and those of the fit as a line."""
-    sensor, (theta, velocity) = run.rod_sensor, fit.curves[0]
+    theta, velocity = fit.curves[0]
     begin = float(run.time[run.trusted][0])
     ends = (begin, begin + SWINGS * math.tau / fit["w0"])
     near = (run.time >= ends[0]) & (run.time <= ends[1]) & np.isfinite(theta)
     time, line = run.time[near], made[near]
-    if sensor is None and time.size > 1:
+    if run.gyroscope is None and time.size > 1:
         # Between readings the model moves on smoothly; the sensor's own error is added.
         smooth = np.linspace(time[0], time[-1], CURVE)
         motion = CubicHermiteSpline(time, theta[near], velocity[near])(smooth)
@@ -85,9 +85,8 @@ def _close(run: Run, fit: TrajectoryFit, read: Floats, made: Floats) -> Panel:
         dataclasses.replace(_line(time, line, BEST, 1.4), name="fit"),
     ]
     up = names.angle(holding(line, read[shown]))
-    if sensor is not None:
-        what = "angular rate" if sensor.unit == "rad/s" else "acceleration"
-        up = Axis(f"{what} ({sensor.unit.replace('s2', 's²')})", up.ends)
+    if run.gyroscope is not None:
+        up = Axis("angular rate (rad/s)", up.ends)
     return Panel("fit", "fit: the first swings", Axis(names.TIME, ends), up, marks)
 
 
@@ -242,7 +241,7 @@ def _noise(x: Floats, error: Floats) -> list[Mark]:
 def residuals(run: Run, residual: Floats, sigma: float, method: str, title: str) -> Panel:
     """Return the residuals of a model over a record, with a band of their noise."""
     gyroscope = run.gyroscope
-    size, unit = (1e3, "mrad") if gyroscope is None else (1e3 * gyroscope.gain, "mrad/s")
+    size, unit = (1e3, "mrad") if gyroscope is None else (1e3 * gyroscope.w0, "mrad/s")
     away = size * np.where(run.trusted, residual, np.nan)
     every, noise = max(1, away.size // MOST), size * sigma
     known = np.abs(away[np.isfinite(away)])

@@ -136,6 +136,22 @@ _ENTRIES: Final = {
         model=varied_model_options,
         stored=True,
     ),
+    "continue": Entry(
+        """Follow periodic orbits along a parameter: branches, folds, doublings, and their ends.
+
+        One parameter is a range: --vary p 0.3:1.6, or --p 0.3:1.6.
+        """,
+        (
+            "pendmap continue --vary p 0.3:1.6 --n 1 --w 1",
+            "pendmap continue --vary p 0.1:1 --n 2 --theta-r 0.05 --omega 1.8 --json",
+        ),
+        example="--n 1 --w 1",
+        further=(
+            option("--theta", types.NUMBER, "Angle of the orbit followed, rad.", group=START),
+            option("--velocity", types.NUMBER, "Velocity there, in SI rad/s.", group=START),
+        ),
+        model=functools.partial(varied_model_options, ends=True),
+    ),
     "orbit": Entry(
         "Find all periodic orbits of period n and w net turns, stable and unstable.",
         ("pendmap orbit --p 1.3 --n 2 --w 0", "pendmap orbit --p 1 --n 1 --w 1 --theta-r 0.05"),
@@ -246,7 +262,7 @@ def _arguments(
     if "grid" in given:
         given["grid"] = take_window(given, _usual(name, model, given))
         cells *= given["grid"].cells
-    if name == "bifurcation":
+    if name in {"bifurcation", "continue"}:
         start = (given.pop("theta"), given.pop("velocity"))
         if (start[0] is None) != (start[1] is None):
             raise click.UsageError(

@@ -57,7 +57,7 @@ _KINDS: Final = {
 """What a file of ``--out`` is, by its suffix; other files are the result itself."""
 _WRITERS: Final = {
     "out": "files.dataset.save",
-    "table": "identification.export.write_readings",
+    "table": "identification.results.write_readings",
     "plot": "render.draw",
     "report": "render.write_report",
     "rerun": "viewer.view",

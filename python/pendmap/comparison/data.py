@@ -35,7 +35,6 @@ MOST: Final = 30_000  # Most readings that are fitted; of more, every second or 
 FEWEST_BLOCKS: Final = 1000
 """Fewest blocks of a record; with fewer readings the integrator's own steps dominate the cost."""
 LEAST_OF_BLOCK: Final = 3  # Fewest readings of a block
-OF_ACCELERATION: Final = "computed from an acceleration, whose own errors are not among the effects"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -100,10 +99,6 @@ def split_records(experiment: Experiment) -> DataSplit:
     experiment.refuse_still(runs)
     runs = tuple(run for run in runs if run.moves)
     for run in runs:
-        if run.accelerometer is not None:
-            raise InputError(
-                f"{run.name}: its angle is {OF_ACCELERATION}: it must be a measured angle or rate"
-            )
         if run.kind == "forced" and not (run.drive or run.pivot):
             raise InputError(f"{run.name}: a forced run must have drive or pivot, neither is given")
     readings = _readings(runs)

@@ -19,7 +19,7 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
 from pendmap.comparison.data import samples_of
-from pendmap.identification.motion import Motion, fit_states, run_forward
+from pendmap.identification.fit import Motion, fit_states, run_forward
 from pendmap.identification.peaks import find_peaks
 from pendmap.identification.runs import FitRun
 from pendmap.identification.table1 import errors_of

@@ -12,7 +12,7 @@ from pendmap.identification.parameters import OFFSET
 from pendmap.identification.peaks import find_peaks
 from pendmap.identification.readings import as_fit_run, reading_of_run
 from pendmap.identification.runs import rig_of
-from pendmap.identification.table1 import table_of_run
+from pendmap.identification.table1 import table1
 
 if TYPE_CHECKING:
     from pendmap.identification.peaks import Peaks
@@ -76,5 +76,5 @@ def compare_free(model: Rig, run: Run) -> RunComparison:
         residual=fit.residuals[0],
         rms=fit.rms,
         peaks=peaks,
-        table=table_of_run(run, peaks, {MODEL: Identification(MODEL, estimates, model=model)}),
+        table=table1(peaks, {MODEL: Identification(MODEL, estimates, model=model)}),
     )

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendmap.comparison.data import split_records
 from pendmap.comparison.forecast import noise_rms, share_closed
 from pendmap.diagnosis.candidates import CORE, ZERO, Candidate
 from pendmap.diagnosis.fitted_model import (
@@ -19,6 +20,7 @@ from pendmap.diagnosis.fitted_model import (
     impose_physics,
     none_if_diverged,
 )
+from pendmap.diagnosis.hold_out import evaluate_hold_out
 from pendmap.diagnosis.refit import best_of, drop_effect
 from pendmap.diagnosis.thresholds import Thresholds
 from pendmap.errors import InputError
@@ -30,9 +32,11 @@ from pendmap.model.rig import own_name
 from pendmap.tables.findings import finding_of
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Sequence
+    from collections.abc import Callable, Collection, Sequence
 
     from pendmap.comparison.data import DataSplit
+    from pendmap.identification.fit import TrajectoryFit
+    from pendmap.identification.runs import FitRun
 
 LOST: Final = 0.1  # Residual of a run, over its swing, above which a fit does not follow it
 POOR: Final = 20.0  # Residual over the noise above which each effect of damping is fitted
@@ -89,7 +93,9 @@ def fit_baseline(
         fits.append(fit and impose_physics(data, fit))
     other = best_of(*fits)
     share = 0.0 if other is None else share_closed(before.fit.rms, other.fit.rms, noise)
-    return base, other if share >= Thresholds().closes else core
+    best = other if share >= Thresholds().closes else core
+    # Without an effect it is the baseline, in a better place.
+    return (best_of(base, best) or base, None) if best and not best.chosen else (base, best)
 
 
 def _enlarged(
@@ -98,12 +104,12 @@ def _enlarged(
     added: Sequence[Candidate],
     *starts: tuple[dict[str, float], bool],
 ) -> FittedModel | None:
-    """Return the best converged fit of a model with effects from starts, or from short windows."""
-    fits = (
-        fit_with_candidates(data, base, added, start, level=base.level, short=short)
-        for start, short in starts
-    )
-    best = best_of(*fits)
+    """Return the best converged fit from starts, long or short; none after noise explains one."""
+    best: FittedModel | None = None
+    for start, short in starts:
+        if best is None or best.noise.chance < Thresholds().rest:
+            fit = fit_with_candidates(data, base, added, start, level=base.level, short=short)
+            best = best_of(best, fit)
     return best and (converge(data, best, best.level) or best)
 
 
@@ -112,55 +118,74 @@ def fit_followed(
 ) -> tuple[DataSplit, FittedModel, FittedModel | None]:
     """Return records that a model follows, and the fits of :func:`fit_baseline` to them.
 
-    A run that is lost is fitted in windows, and set aside if it is lost there too.
+    Lost runs are fitted in windows. While some are lost there too, the worst is set aside: a run
+    that is lost spoils the fit to others.
     """
     base, core = fit_baseline(data, model, without)
-    for change in (in_windows, set_aside):
-        lost = lost_runs(data, best_of(base, core) or base)
-        if lost and (changed := change(data, lost)) is not None:
-            data = changed
-            base, core = fit_baseline(data, model, without)
+    change: Callable[[DataSplit, Sequence[int]], DataSplit | None] = in_windows
+    while lost := lost_of(data, best_of(base, core) or base):
+        every = {*data.fitted_of, *data.held_of}
+        changed = change(data, lost) if len(lost) < len(every) or change is in_windows else None
+        if changed is None:
+            break
+        data, change = changed, set_aside
+        base, core = fit_baseline(data, model, without)
     return data, base, core
 
 
-def in_windows(data: DataSplit, lost: Sequence[int]) -> DataSplit:
+def in_windows(data: DataSplit, lost: Collection[int]) -> DataSplit:
     """Return records with shorter windows in the lost free runs."""
-    fitted = list(data.fitted)
-    for k in (k for k in lost if not fitted[k].forced):
-        longest = float(np.ptp(fitted[k].time)) / WINDOWS
-        fitted[k] = dataclasses.replace(fitted[k], longest_s=longest)
-    return dataclasses.replace(data, fitted=tuple(fitted))
+
+    def shorter(run: FitRun, of: int) -> FitRun:
+        if run.forced or of not in lost:
+            return run
+        return dataclasses.replace(run, longest_s=float(np.ptp(run.time)) / WINDOWS)
+
+    fitted = tuple(map(shorter, data.fitted, data.fitted_of))
+    held = data.held if data.inside else tuple(map(shorter, data.held, data.held_of))
+    return dataclasses.replace(data, fitted=fitted, held=held)
 
 
 def set_aside(data: DataSplit, lost: Sequence[int]) -> DataSplit | None:
-    """Return records without the lost runs, with a finding about each; None if none remains."""
-    out = {data.fitted_of[k] for k in lost}
-    places = [k for k, of in enumerate(data.fitted_of) if of not in out]
-    held = [k for k, of in enumerate(data.held_of) if of not in out]
-    if not places or not held:
+    """Return the other runs, divided anew, with a finding on the worst; None if none can be fitted.
+
+    The first of the lost runs is the worst.
+    """
+    worst, of = data.runs[lost[0]], {*data.fitted_of, *data.held_of}
+    finding = finding_of("run-lost", where=worst.name, percent=100 * LOST)
+    rest = tuple(run for k, run in enumerate(data.runs) if k in of and k != lost[0])
+    try:
+        again = split_records(dataclasses.replace(data.experiment, runs=rest))
+    except InputError:
         return None
-    runs = list(data.runs)
-    for k in out:
-        finding = finding_of("run-lost", where=runs[k].name, percent=100 * LOST)
-        runs[k] = dataclasses.replace(runs[k], findings=(*runs[k].findings, finding))
-    return dataclasses.replace(
-        data,
-        runs=tuple(runs),
-        fitted=tuple(data.fitted[k] for k in places),
-        fitted_of=tuple(data.fitted_of[k] for k in places),
-        held=tuple(data.held[k] for k in held),
-        held_of=tuple(data.held_of[k] for k in held),
-    )
+    pairs = zip((*data.fitted, *data.held), (*data.fitted_of, *data.held_of), strict=True)
+    short = {data.runs[k].name for run, k in pairs if run.longest_s is not None}
+    again = in_windows(again, {k for k, run in enumerate(again.runs) if run.name in short})
+    worst = dataclasses.replace(worst, findings=(*worst.findings, finding))
+    out = [k for k in range(len(data.runs)) if k not in of]
+    runs = (*again.runs, *(data.runs[k] for k in out), worst)
+    readings = (*again.readings, *(data.readings[k] for k in (*out, lost[0])))
+    return dataclasses.replace(again, experiment=data.experiment, runs=runs, readings=readings)
 
 
-def lost_runs(data: DataSplit, fitted: FittedModel) -> list[int]:
-    """Return the places of the runs that a model does not follow."""
-    lost = []
-    for k, (run, residual) in enumerate(zip(data.fitted, fitted.fit.residuals, strict=True)):
+def lost_of(data: DataSplit, fitted: FittedModel) -> list[int]:
+    """Return the indices in ``data.runs`` of the runs that a model does not follow, worst first."""
+    misses = {data.fitted_of[k]: miss for k, miss in lost_runs(data.fitted, fitted.fit).items()}
+    held = None if data.inside else none_if_diverged(evaluate_hold_out)(data, fitted)
+    if held is not None:
+        misses |= {data.held_of[k]: miss for k, miss in lost_runs(data.held, held.fit).items()}
+    return sorted(misses, key=lambda k: -misses[k])
+
+
+def lost_runs(runs: Sequence[FitRun], fit: TrajectoryFit) -> dict[int, float]:
+    """Return the places of runs that a fit does not follow, with residuals over their swings."""
+    lost = {}
+    for k, (run, residual) in enumerate(zip(runs, fit.residuals, strict=True)):
         good = np.isfinite(residual) & run.counted
         swing = min(float(np.ptp(run.theta[run.counted])) / 2, math.pi)
-        if not good.any() or float(np.mean(residual[good] ** 2)) > (LOST * swing) ** 2:
-            lost.append(k)
+        miss = math.sqrt(float(np.mean(residual[good] ** 2))) / swing if good.any() else math.inf
+        if miss > LOST:
+            lost[k] = miss
     return lost
 
 

@@ -39,9 +39,7 @@ def evaluate_hold_out(data: DataSplit, fitted: FittedModel) -> HoldOut:
     """
     model, free = fitted.fit.model, fitted.free
     known = {
-        name: value
-        for name, value in fitted.start.items()
-        if "[" not in name and name not in SENSOR
+        name: value for name, value in fitted.start.items() if "[" not in name and name != SENSOR
     }
     if not any(run.drive for run in data.held):
         # Effects of the drive do not act without a harmonic drive.
@@ -90,7 +88,7 @@ def _of_runs(fit: TrajectoryFit, first: int) -> dict[str, float]:
     values = {}
     for name, estimate in fit.estimates.items():
         kind, _, number = name.rstrip("]").partition("[")
-        if kind in {"phi", *SENSOR}:
+        if kind in {"phi", SENSOR}:
             values[f"{kind}[{first + int(number or 0)}]"] = estimate.value
     return values
 

@@ -102,6 +102,7 @@ def name_effects(
                 ci95,
                 probability,
                 assessment.verdict == "partial"
+                or assessment.further
                 or round(probability, 3) < assessment.thresholds.sure
                 or (untimed and "laboratory" in candidate.definition.formula)
                 or bool(doubt_keys(data.experiment, *data.runs)),

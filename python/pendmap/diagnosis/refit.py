@@ -139,14 +139,16 @@ def try_mirrored_places(data: DataSplit, fitted: FittedModel) -> FittedModel:
     """Return the best of a fit and of fits with places mirrored about the rest position.
 
     A swinging pendulum passes ``th0`` and ``-th0`` alike, and a knock of the other sign half a
-    swing later does nearly the same; no fit moves from one to the other.
+    swing later does nearly the same; no fit moves from one to the other. An instant is moved
+    again while that gains more than an independent reading.
     """
     for candidate in fitted.chosen:
         starts = _mirrored(fitted, candidate)
         while starts:
             other = _fit_from(data, fitted, candidate, starts.pop(), MIRROR_STEPS)
             if other is not None and other.chi2 < fitted.chi2:
-                fitted, starts = other, _mirrored(other, candidate) if candidate.once else starts
+                moves = candidate.once and other.chi2 < fitted.chi2 - fitted.level
+                fitted, starts = other, _mirrored(other, candidate) if moves else starts
     return fitted
 
 

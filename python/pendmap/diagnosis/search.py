@@ -45,7 +45,7 @@ def search(state: State, core: FittedModel | None) -> FittedModel:
         state.attempts.append(Attempt(core.names, {}, gain, fall, None, bool(best.chosen), 0))
     # Alternatives of the core's effects are searched at models without these effects.
     reduced = [state.leave_out(best, candidate) for candidate in best.chosen]
-    starts = [model for model in reduced if not lost_runs(state.data, model)]
+    starts = [model for model in reduced if not lost_runs(model.runs, model.fit)]
     best_known: dict[Key, float] = {}
     # A set of effects is enlarged again only from a clearly better fit, as effects may be dropped.
     margin = state.thresholds.alike

@@ -15,12 +15,12 @@ from pendmap.diagnosis.fitted_model import (
     fit_again,
     impose_physics,
     model_errors,
+    none_if_diverged,
     weight_records,
 )
 from pendmap.diagnosis.hold_out import HoldOut, evaluate_hold_out, hold_out_losses
 from pendmap.diagnosis.refit import add_effects, drop_effect, key_of, refit_with
 from pendmap.diagnosis.scores import Scores, score_candidates
-from pendmap.errors import FitDiverged
 from pendmap.identification.experiment import CLOSED, MISSES
 
 if TYPE_CHECKING:
@@ -96,7 +96,8 @@ class State:
         self._reduced: set[tuple[Key, str]] = set()
         self._refits: dict[tuple[FittedModel, Key], FittedModel | None] = {}
         self._scores: dict[FittedModel, Scores] = {}
-        self._held: dict[FittedModel, tuple[HoldOut | None, tuple[float, ...]]] = {}
+        self._held: dict[FittedModel, HoldOut | None] = {}
+        self._losses: dict[FittedModel, tuple[float, ...]] = {}
 
     def reweight(self, best: FittedModel) -> FittedModel:
         """Add a model's error to the weights of the readings; return the model fitted with them.
@@ -225,7 +226,7 @@ class State:
         """Return a model without effects with that of the core if it halves the squared gap.
 
         Coloured residuals have too few independent readings for a significant gain: instead the
-        gap without the effect must be halved in the fitted records and in those held back.
+        gap without the effect must be halved in all records, with its share of those held back.
         """
         gap = self.begun.fit.rms > MISSES * self.noise and 0 < self.most == self.remaining(last)
         full = self.remember(self._fit_again(core)) if core is not None and gap else None
@@ -240,30 +241,31 @@ class State:
         return last
 
     def _halves_gap(self, reduced: FittedModel, full: FittedModel) -> bool:
-        """Return whether a model halves another's squared gap in all records."""
+        """Return whether a model halves another's squared gap, and closes a third of that held."""
         before, after = self.hold_out(reduced), self.hold_out(full)
         if before is None or after is None:
             return False
-        held = share_closed(before.fit.rms, after.fit.rms, noise_rms(self.records.held))
-        fitted = share_closed(reduced.fit.rms, full.fit.rms, self.noise)
-        return min(held, fitted) >= 1 - CLOSED
+        parts = [(full.fit.samples, reduced.fit.rms, full.fit.rms, self.noise)]
+        parts += [(after.fit.samples, before.fit.rms, after.fit.rms, noise_rms(self.records.held))]
+        count, *squares = np.array([(n, *(n * x**2 for x in part)) for n, *part in parts]).T
+        whole = share_closed(*(math.sqrt(x.sum() / count.sum()) for x in squares))
+        return whole >= 1 - CLOSED and share_closed(*parts[1][1:]) >= self.thresholds.closes
 
     def hold_out(self, fitted: FittedModel) -> HoldOut | None:
         """Return the hold-out evaluation of a model; None if it diverges."""
-        return self._evaluated(fitted)[0]
+        if fitted not in self._held:
+            self._held[fitted] = none_if_diverged(evaluate_hold_out)(self.data, fitted)
+        return self._held[fitted]
 
     def hold_out_losses(self, fitted: FittedModel) -> tuple[float, ...]:
         """Return the increase of a model's sum of squares by each held-out set."""
-        return self._evaluated(fitted)[1]
-
-    def _evaluated(self, fitted: FittedModel) -> tuple[HoldOut | None, tuple[float, ...]]:
-        if fitted not in self._held:
-            try:
-                held = evaluate_hold_out(self.data, fitted)
-                self._held[fitted] = held, hold_out_losses(self.data, fitted, held, self.level)
-            except FitDiverged:
-                self._held[fitted] = None, (math.inf,)
-        return self._held[fitted]
+        if fitted not in self._losses:
+            held = self.hold_out(fitted)
+            losses: tuple[float, ...] = (math.inf,)
+            if held is not None:
+                losses = hold_out_losses(self.data, fitted, held, self.level)
+            self._losses[fitted] = losses
+        return self._losses[fitted]
 
     def scored(self, fitted: FittedModel) -> ScoredModel:
         """Return a model with its hold-out evaluation; raise FitDiverged if that diverges."""

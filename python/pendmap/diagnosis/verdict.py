@@ -189,6 +189,7 @@ class Assessment:
     uneven: float  # Difference of parameters between runs, over its standard error (Cochran's Q)
     form: GoodnessOfFit
     probabilities: tuple[float, ...]  # That each name, or one of its class, is right
+    further: bool  # Whether another effect would close its share of the slight gap that is left
     thresholds: Thresholds  # Thresholds of all decisions
 
 
@@ -212,7 +213,11 @@ def decide_verdict(state: State, best: ScoredModel, runs: RunByRun, chance: floa
         readings = max(held.degrees / fitted.level, 1.0)
         held_out = float(chdtrc(readings, held.chi2 / most / fitted.level))
     others = {"torque": chance, "slow": noise.chance, "runs": runs.chance, "held_out": held_out}
-    form = assess_fit(state.scores(fitted), noise.chance_of, others)
+    scores = state.scores(fitted)
+    form = assess_fit(scores, noise.chance_of, others)
+    gap = fitted.chi2 * (1 - (state.noise / fitted.fit.rms) ** 2)
+    gain = max((score.gain for score in scores.scores), default=0.0)
+    further = form.chances["effects"] < limits.rest and gain > limits.closes * gap
     chance_left = form.chance if ratio <= allowed else 0.0
     closed = state.closed(state.base, fitted)
     slight = closed >= WHOLE and fitted.fit.rms <= SLIGHT * state.noise
@@ -230,7 +235,7 @@ def decide_verdict(state: State, best: ScoredModel, runs: RunByRun, chance: floa
     else:
         verdict = "named"
     residuals = left, ratio, allowed, held.chi2 / max(held.degrees, 1), closed, runs.uneven
-    return Assessment(verdict, identified, *residuals, form, sure, limits)
+    return Assessment(verdict, identified, *residuals, form, sure, further, limits)
 
 
 def features(chance: float, gains: Sequence[float]) -> list[tuple[float, ...]]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from pendmap.formatting import estimate_text, interval
 from pendmap.identification.parameters import OPPOSING
-from pendmap.identification.period import viscous_work
+from pendmap.identification.peaks import viscous_work
 from pendmap.identification.uncertainty import computed_from
 
 if TYPE_CHECKING:

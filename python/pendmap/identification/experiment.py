@@ -33,7 +33,7 @@ from pendmap.identification.methods.trajectory import (
 )
 from pendmap.identification.peaks import Peaks, find_peaks
 from pendmap.identification.report import IdentificationReport
-from pendmap.identification.table1 import table_of_run
+from pendmap.identification.table1 import table1
 from pendmap.identification.turning import TooShortError
 from pendmap.model import Rig
 from pendmap.model.effects import definition
@@ -160,7 +160,7 @@ def identify(  # noqa: PLR0913 (each is asked for by name)
     if run.peaks_only:
         peaks = Peaks.of(run.time[run.trusted], run.theta[run.trusted])
         results = identify_peaks(peaks, names)
-        table = table_of_run(run, peaks, results)
+        table = table1(peaks, results)
         return IdentificationReport(experiment, run, peaks, results, None, table)
     others = [name for name in names if name != BEST]
     steps, done = len(names) + 2, itertools.count(1)
@@ -180,7 +180,7 @@ def identify(  # noqa: PLR0913 (each is asked for by name)
         result = apply_method(name, peaks.later(-first), record)
         results[name] = result.with_clock(run.clock_stderr)
         report(next(done), steps)
-    table = table_of_run(run, peaks, results)
+    table = table1(peaks, results)
     drag = None if joint is None or start is not None or effects else _with_drag(joint)
     report(next(done), steps)
     asked = tuple(effect if isinstance(effect, str) else effect.name for effect in effects)
@@ -222,15 +222,12 @@ def _best(
         known["w0"] = experiment.w0
     try:
         joint = fit_together(runs, start=start or known, effects=effects)
-    except TooShortError as error:
-        if effects:
-            raise
-        return None, Identification(BEST, warnings=(str(error),), applicable=False)
-    except FitDiverged as error:
-        if start is not None or effects:
-            raise
+    except (TooShortError, FitDiverged) as error:
+        short = isinstance(error, TooShortError)
         # Other methods can replace this one, but not for requested effects or starting values.
-        return None, Identification(BEST, warnings=(str(error),), applicable=False, converged=False)
+        if effects or not (short or start is None):
+            raise
+        return None, Identification(BEST, warnings=(str(error),), applicable=False, converged=short)
     certain = joint.fit.converged or len(runs) > 1
     # A wrong unit makes residuals meaningless.
     if certain and not doubt_keys(experiment, *runs) & UNIT_FINDINGS:

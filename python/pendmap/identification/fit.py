@@ -1,4 +1,4 @@
-"""Fitting of a pendulum to records by multiple shooting, implemented in Rust (``src/fit``)."""
+"""Fitting of a pendulum to records by multiple shooting (in Rust, ``src/fit``), and its motion."""
 
 from __future__ import annotations
 
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
     from pendmap.signal import Floats
+
+    States = Sequence[tuple[float, float]]
 
 GROWTH: Final = 4.0  # Factor by which windows grow from stage to stage
 LEVEL: Final = 3.841458820694124  # 95 % point of chi-squared with one degree of freedom
@@ -71,13 +73,12 @@ class TrajectoryFit:
         return next((name for name in names if self[name] < 0), None)
 
     def sensors_of(self, places: Sequence[int]) -> dict[str, float]:
-        """Return bias and tilt of some runs' sensors, named as in a fit to these runs alone."""
+        """Return the bias of some runs' sensors, named as in a fit to these runs alone."""
         values = {}
         for k, place in enumerate(places):
-            for name in SENSOR:
-                known = self.estimates.get(f"{name}[{place}]") or self.estimates.get(name)
-                if known is not None:
-                    values[f"{name}[{k}]" if len(places) > 1 else name] = known.value
+            known = self.estimates.get(f"{SENSOR}[{place}]") or self.estimates.get(SENSOR)
+            if known is not None:
+                values[f"{SENSOR}[{k}]" if len(places) > 1 else SENSOR] = known.value
         return values
 
     def drive_of(self, run: FitRun, place: int) -> Mapping[str, float | None] | None:
@@ -115,7 +116,7 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
     ``model`` gives fixed parameters and starting values; ``start`` replaces starting values, where
     damping may be negative. ``free`` has names of :class:`pendmap.Rig` and ``effect.parameter``;
     those of the drive are fitted run by run, as are unknown phases. ``hold`` fixes the parameters
-    at their starting values, also bias and tilt of sensors in ``start``: only initial states and
+    at their starting values, also a bias of sensors in ``start``: only initial states and
     what is unknown of single runs are fitted. ``sigma_doubt`` is
     the relative standard error of ``sigma``, ``steps`` the maximum number of iterations in a stage;
     the search ends when the expected gain of a step is below ``least_gain``, or, with ``windows``,
@@ -128,7 +129,7 @@ def fit_runs(  # noqa: PLR0913 (the records, and what is known of them)
     wanted = names if profiled is None else profiled
     chosen = [k for k, n in enumerate(names) if {n, n.partition("[")[0]} & {*wanted}]
     begun = {name.partition("[")[0] for name in start or ()}
-    held = {*free, *begun.intersection(SENSOR)} if hold else set()
+    held = {*free, *begun.intersection([SENSOR])} if hold else set()
     choices = {
         "tolerance": tolerance_of(runs),
         "shortest": units.w0 * (math.tau / model.w0),
@@ -254,3 +255,63 @@ def refuse_astray(path: Path, runs: Sequence[FitRun], fit: TrajectoryFit) -> Non
                 "they must be free decays of one pendulum, and a forced run must have "
                 'kind = "forced" and its drive in an experiment.toml'
             )
+
+
+OWN: Final = ("w0", "c_over_m", "Tr", "torque")
+"""Parameters kept apart from the model, whose damping cannot be negative as a fitted one can."""
+
+STATE_STEPS: Final = 12  # Most least-squares iterations for initial states
+
+
+@dataclasses.dataclass(frozen=True)
+class Motion:
+    """Equation of motion of a fitted pendulum."""
+
+    model: Rig  # Model with its effects
+    own: Mapping[str, float]  # Values of the model's parameters, and of sensors by their run
+
+    @classmethod
+    def of(cls, fit: TrajectoryFit) -> Motion:
+        """Return the motion of a fitted model."""
+        return cls(fit.model, {name: fit[name] for name in OWN if name in fit.estimates})
+
+
+def run_forward(
+    motion: Motion, runs: Sequence[FitRun], states: States
+) -> list[tuple[Floats, Floats]]:
+    """Return readings (n,), rad, and angle and velocity (2, n), rad and rad/s, of each run.
+
+    ``runs`` give times, drives and laboratory times; ``states`` are angle (rad) and velocity
+    (rad/s) at the first time of each. Raises FitDiverged.
+    """
+    blank = [dataclasses.replace(run, theta=np.zeros(run.time.shape), trusted=None) for run in runs]
+    fit = _fit_motion(motion, blank, states, steps=0)
+    pairs = zip(fit.residuals, fit.curves, strict=True)
+    return [(-residual, curve) for residual, curve in pairs]
+
+
+def fit_states(motion: Motion, runs: Sequence[FitRun], states: States) -> list[tuple[float, float]]:
+    """Return the least-squares initial states of runs; raises FitDiverged."""
+    fit = _fit_motion(motion, runs, states, steps=STATE_STEPS)
+    return [(theta, velocity) for *_, theta, velocity in fit.windows]
+
+
+def _fit_motion(
+    motion: Motion, runs: Sequence[FitRun], states: States, *, steps: int
+) -> TrajectoryFit:
+    """Fit initial states, in one window a run, with all parameters fixed."""
+    whole = [dataclasses.replace(run, longest_s=math.inf) for run in runs]
+    windows = [
+        (k, 0, run.time.size, *state)
+        for k, (run, state) in enumerate(zip(whole, states, strict=True))
+    ]
+    return fit_runs(
+        whole,
+        motion.model,
+        tuple(name for name in motion.own if name in OWN),
+        start=motion.own,
+        windows=windows,
+        profiled=(),
+        hold=True,
+        steps=steps,
+    )

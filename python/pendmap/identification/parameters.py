@@ -28,7 +28,7 @@ PLACES: Final[Mapping[str, tuple[str, float]]] = {"w0": ("gravity", 1)} | {
 }
 """Name in the core of each parameter of a rig, and the power of ``w0`` in its SI value."""
 
-SENSOR: Final = ("bias", "tilt")  # Parameters of a sensor on the rod, always fitted run by run
+SENSOR: Final = "bias"  # Parameter of a gyroscope, always fitted run by run
 OPPOSING: Final = ("c_over_m", "Tr")  # Coefficients that oppose the motion and are at least 0
 OFFSET: Final = "encoder_offset"  # Effect that is the sensor's zero error
 PER_RUN: Final = ("p", "Omega", "phi")  # Parameters of the drive of one run
@@ -60,8 +60,8 @@ def free_quantities(
 ) -> list[Quantity]:
     """Return the free parameters of a fit to runs with given rigs.
 
-    ``free`` has names as in :func:`pendmap.identification.fit.fit_runs`; unknown phases, and bias
-    and tilt of sensors on the rod, are added. ``start`` has starting values that replace the
+    ``free`` has names as in :func:`pendmap.identification.fit.fit_runs`; unknown phases, and the
+    bias of gyroscopes, are added. ``start`` has starting values that replace the
     rigs'.
     """
     names = list(dict.fromkeys(free))
@@ -91,10 +91,9 @@ def free_quantities(
     for k, run in enumerate(runs):
         if run.rod_sensor is None:
             continue
-        units = {"bias": run.rod_sensor.unit, "tilt": 1.0}
-        for name in SENSOR if run.rod_sensor.leans else SENSOR[:1]:
-            begin = start.get(name + of_run[k], start.get(name, 0.0))
-            quantities.append(Quantity(name + of_run[k], 0, [(k, name)], begin, units[name]))
+        begin = start.get(SENSOR + of_run[k], start.get(SENSOR, 0.0))
+        unit = run.rod_sensor.unit
+        quantities.append(Quantity(SENSOR + of_run[k], 0, [(k, SENSOR)], begin, unit))
     return quantities
 
 

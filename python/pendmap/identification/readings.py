@@ -113,7 +113,7 @@ def as_fit_run(run: Run, reading: Reading) -> FitRun:
     Times are relative to the first sample, except under a drive, for its phase.
     """
     time, first = from_first(run.time) if run.drive is None else (run.time, 0.0)
-    pivot = None
+    pivot, gyro = None, run.gyroscope
     if run.pivot is not None:
         quantity = QUANTITIES[run.pivot_unit or "m/s2"]
         pivot = Pivot(
@@ -128,37 +128,25 @@ def as_fit_run(run: Run, reading: Reading) -> FitRun:
         pivot=pivot,
         lab_time_s=run.lab_time_s + first,
         name=run.name,
-        rod_sensor=_rod_sensor(run),
+        rod_sensor=None if gyro is None else RodSensor(run.theta, 1 / gyro.w0, gyro.w0),
         count=reading.count if reading.coarse else None,
         clock_stderr=run.clock_stderr,
     )
 
 
 def as_angles(run: Run) -> Floats:
-    """Return a run's angles; for a sensor on the rod, readings over the gain of small swings."""
-    return run.read / (1.0 if run.rod_sensor is None else run.rod_sensor.gain)
+    """Return a run's angles; for a gyroscope, readings over the gain of small swings."""
+    return run.read / (1.0 if run.gyroscope is None else run.gyroscope.w0)
 
 
 def reading_of_run(run: Run, sigma: float | None = None) -> Reading:
     """Return the standard errors of a run's readings; see :func:`reading_of`."""
-    time, sensor = from_first(run.time)[0], run.rod_sensor
-    if sensor is None:
+    time = from_first(run.time)[0]
+    if run.gyroscope is None:
         return reading_of(time, run.theta, sigma, trusted=run.trusted, count=run.count_rad)
     reading = reading_of(time, as_angles(run), sigma, trusted=run.trusted)
     law = reading.law
-    if law is not None and run.gyroscope is not None:
+    if law is not None:
         # The error of a rate by jitter is proportional to the acceleration.
         law = dataclasses.replace(law, grows_with="acceleration")
-    return dataclasses.replace(reading, law=law, gain=abs(sensor.gain), unit=sensor.unit)
-
-
-def _rod_sensor(run: Run) -> RodSensor | None:
-    if run.gyroscope is not None:
-        gain = run.gyroscope.gain
-        return RodSensor(run.theta, rate=1 / gain, unit=gain, leans=False)
-    sensor = run.accelerometer
-    if sensor is None:
-        return None
-    place, gravity = sensor.distance_m / sensor.gain, sensor.gravity / sensor.gain
-    leans = sensor.direction != "angular"
-    return RodSensor(run.theta, place=place, gravity=gravity, unit=sensor.gain, leans=leans)
+    return dataclasses.replace(reading, law=law, gain=run.gyroscope.w0, unit="rad/s")

@@ -11,7 +11,7 @@ import numpy as np
 from pendmap.errors import InputError
 from pendmap.formatting import counted, estimate_text, interval, percent
 from pendmap.identification.engineering import QUANTITIES, lines_of, quantities, swing_amplitude
-from pendmap.identification.methods.trajectory import DRAG, identification_of
+from pendmap.identification.methods.trajectory import DRAG, UNFIT, identification_of
 from pendmap.identification.parameters import OFFSET, SENSOR
 from pendmap.identification.results import FitResult, Followed
 from pendmap.records.summary import doubts, finding_lines
@@ -92,7 +92,7 @@ class IdentificationReport(FitResult):
     @property
     def warnings(self) -> tuple[str, ...]:
         """Reasons to doubt records, parameters and model, as ``pendmap identify`` prints them."""
-        return (*foremost(self), *(() if self.sound is None else self.sound.warnings))
+        return tuple(dict.fromkeys([*foremost(self), *(self.sound.warnings if self.sound else ())]))
 
     @property
     def parameters(self) -> Mapping[str, Estimate]:
@@ -104,7 +104,7 @@ class IdentificationReport(FitResult):
         """All readings of the fitted runs, one below the other.
 
         ``time_s`` on the clock of the run, ``reading_rad``, ``fit_rad``, ``residual_rad`` and
-        ``run``; of a sensor on the rod ``reading_rad_per_s`` or so. Fit and residual are nan where
+        ``run``; of a gyroscope ``reading_rad_per_s`` and so on. Fit and residual are nan where
         a reading is not fitted. InputError is raised without a fit of whole records.
         """
         import pandas as pd  # noqa: PLC0415 (where it is needed)
@@ -112,8 +112,7 @@ class IdentificationReport(FitResult):
         fit, _, runs = self.followed()
         parts = []
         for run, left in zip(runs, fit.residuals, strict=True):
-            sensor = run.rod_sensor
-            gain, unit = (1.0, "rad") if sensor is None else (sensor.gain, sensor.unit)
+            gain, unit = (1.0, "rad") if run.gyroscope is None else (run.gyroscope.w0, "rad/s")
             residual = np.where(run.trusted, gain * left, np.nan)
             columns = {"reading": run.read, "fit": run.read - residual, "residual": residual}
             named = {
@@ -211,8 +210,8 @@ class IdentificationReport(FitResult):
         best, notes = self.best, dict[str, Any]()
         if best.covariance is not None:
             names, matrix = best.covariance
-            # Bias and tilt of a sensor do not belong to the pendulum.
-            written = {name: name for name in names if name.partition("[")[0] not in SENSOR}
+            # The bias of a sensor does not belong to the pendulum.
+            written = {name: name for name in names if name.partition("[")[0] != SENSOR}
             if "offset" in written:
                 written["offset"] = f"{OFFSET}.d"
             places = [names.index(name) for name in written]
@@ -343,7 +342,7 @@ def in_short(report: IdentificationReport) -> Iterator[str]:
     if runs_text:
         yield runs_text
     yield from finding_lines(report.experiment, *report.runs, changes=True)
-    yield from (f"Warning: {text}" for text in (() if best is None else best.warnings))
+    yield from (f"Warning: {text}" for text in report.warnings[len(foremost(report)) :])
     if report.with_drag is not None and report.joint is not None:
         drag = identification_of(report.with_drag)
         name = next(n for n in drag.estimates if n.startswith(DRAG))
@@ -364,9 +363,10 @@ def in_line(known: Mapping[str, Estimate]) -> str:
 
 
 def foremost(report: IdentificationReport) -> list[str]:
-    """Return doubts about the records, and the text on a preferred method that failed."""
-    first = doubts(report.experiment, *report.runs)
-    return [*first, report.passed_over] if report.passed_over else first
+    """Return doubts about records and model, and the text on a preferred method that failed."""
+    best, other = report.sound, report.passed_over
+    unfit = [text for text in (best.warnings if best else ()) if text.startswith(UNFIT)]
+    return [*doubts(report.experiment, *report.runs), *unfit, *([other] if other else [])]
 
 
 def methods_table(report: IdentificationReport) -> tuple[list[str], list[list[str]]]:

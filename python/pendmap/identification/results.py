@@ -1,20 +1,22 @@
-"""What results of records have in common: parameters, residual, motion of the model."""
+"""What results of records have in common: parameters, residual, motion of the model; files."""
 
 from __future__ import annotations
 
 import abc
 import dataclasses
-from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple, Protocol
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 
 from pendmap.errors import InputError, short_repr
+from pendmap.files.atomic import whole_file
 from pendmap.files.saved import Saved
 from pendmap.files.variables import variable
 from pendmap.formatting import estimate_text, html_table, interval, moment
-from pendmap.identification.motion import Motion, run_forward
+from pendmap.identification.fit import Motion, run_forward
 from pendmap.model.effects import definition
 from pendmap.model.labels import unit_of
 
@@ -32,6 +34,8 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats
 
     Covariance = tuple[Sequence[str], Floats]
+    import os
+
 
 EXACT: Final = 1e-9  # Nominal noise that sets the integrator's tolerance of a prediction, rad
 STEP: Final = 1e-3  # Time between samples that are added, since a run has three or more, s
@@ -123,7 +127,7 @@ class Parameters(Saved):
         """Return the unit of a parameter; empty for a pure number."""
         parameter, _, run = name.partition("[")
         if parameter == "bias" and self.sensors:
-            return self.sensors[int(run[:-1] or 0)].replace("s2", "s²")
+            return self.sensors[int(run[:-1] or 0)]
         return unit_of(name, self.definition)
 
     def to_dataframe(self) -> pd.DataFrame:
@@ -193,8 +197,7 @@ class FitResult(Parameters):
     @property
     def sensors(self) -> Sequence[str]:
         """Units of the readings of each fitted run."""
-        sensors = (run.rod_sensor for run in self.followed().runs)
-        return ["rad" if sensor is None else sensor.unit for sensor in sensors]
+        return ["rad/s" if run.gyroscope else "rad" for run in self.followed().runs]
 
     def further(self) -> dict[str, Any]:
         """Return the covariance, and time and run of each reading that is fitted."""
@@ -286,3 +289,31 @@ class FitResult(Parameters):
 def _begin(given: FitRun, run: Run) -> float:
     """Return the time on the clock of a run at time 0 of its fit, s."""
     return 0.0 if given.drive is not None else float(run.time[0])
+
+
+SUFFIXES: Final = (".csv", ".xlsx", ".mat")
+MOST_ROWS: Final = 2**20 - 1  # Rows of a sheet of Excel below its header
+
+
+class _Read(Protocol):
+    @property
+    def readings(self) -> pd.DataFrame: ...
+
+
+def write_readings(report: _Read, path: str | os.PathLike[str]) -> Path:
+    """Write the ``readings`` of a report; ``.mat`` has a variable a column, runs as cells."""
+    table, suffix = report.readings, Path(path).suffix.lower()
+    if suffix == ".xlsx" and len(table) > MOST_ROWS:
+        text = f"must have {MOST_ROWS} readings at most, got {len(table)}: .csv and .mat take all"
+        raise InputError(f"{path}: {text}")
+    with whole_file(path, SUFFIXES) as part:
+        if suffix == ".csv":
+            table.to_csv(part, index=False)
+        elif suffix == ".xlsx":
+            table.to_excel(part, index=False, sheet_name="readings", engine="openpyxl")
+        else:
+            from scipy.io import savemat  # noqa: PLC0415 (where it is needed)
+
+            columns = {name: values.to_numpy() for name, values in table.items()}
+            savemat(part, columns, do_compression=True, oned_as="column")
+    return Path(path)

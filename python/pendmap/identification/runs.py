@@ -41,21 +41,11 @@ class Pivot:
 
 @dataclasses.dataclass(frozen=True)
 class RodSensor:
-    """Gyroscope or accelerometer on the rod, whose readings are fitted instead of angles.
-
-    A gyroscope reads ``rate th' + bias``, an accelerometer ``place (th'' cos(tilt) + th'**2
-    sin(tilt)) + gravity sin(th + tilt) + bias``; ``bias`` and ``tilt`` are fitted. At every turning
-    point friction changes sign, ``th''`` jumps by ``2 Tr`` and the reading by ``2 place Tr``: the
-    reading whose sampling interval includes the turning point has a share of the jump. While
-    friction holds the pendulum, ``th''`` is 0.
-    """
+    """Gyroscope on the rod, whose readings ``rate th' + bias`` are fitted instead of angles."""
 
     angle: Floats  # initial guess of the angle, rad, shape (n,)
-    rate: float = 0.0  # reading per rad/s; 0 for an accelerometer
-    place: float = 0.0  # reading per rad/s^2; 0 for a gyroscope
-    gravity: float = 0.0  # reading of full gravity; 0 if the sensor does not measure it
-    unit: float = 1.0  # unit of a bias over the unit of the readings
-    leans: bool = True  # whether the tilt of the axis is fitted
+    rate: float  # reading per rad/s
+    unit: float  # unit of a bias over the unit of the readings
 
 
 @dataclasses.dataclass(frozen=True)
@@ -133,15 +123,8 @@ def _bare_sensor(run: FitRun, units: Units) -> dict[str, Any] | None:
     sensor = run.rod_sensor
     if sensor is None:
         return None
-    # The pivot's motion does not affect a rate, but it affects an acceleration.
-    if run.forced and (sensor.place or sensor.gravity):
-        raise InputError(f"{run.name or 'run'}: an accelerometer on a moving pivot is not fitted")
     return {
         "rate": float(units.given(sensor.rate, 1)),
-        "place": float(units.given(sensor.place, 2)),
-        "gravity": sensor.gravity,
-        # A reading is the mean over a sampling interval.
-        "interval": float(units.bare(float(np.median(np.diff(run.time))), -1)),
         "angle": np.ascontiguousarray(sensor.angle, np.float64),
     }
 

@@ -90,7 +90,7 @@ def window_slopes(
     from pendmap import _core  # noqa: PLC0415 (deferred import of the core)
 
     base = list(dict.fromkeys(name.partition("[")[0] for name in fit.names))
-    base = [name for name in base if name not in SENSOR]  # always fitted
+    base = [name for name in base if name != SENSOR]  # always fitted
     start = {name: fit.estimates[name].value for name in fit.names}
     unknown, given = prepared(runs, model, [*base, *candidates], start)
     begin, windows = unknown.start, bare_windows(fit.windows, unknown.units)

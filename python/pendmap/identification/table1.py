@@ -12,25 +12,18 @@ from pendmap.analysis.trajectory import simulate
 from pendmap.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
     from numpy.typing import NDArray
 
     from pendmap.identification.methods.base import Identification
     from pendmap.identification.peaks import Peaks
     from pendmap.model import Rig
-    from pendmap.records import Run
     from pendmap.signal import Floats
 
 PERIODS: Final = (0.26, 1.54)
 """Periods of the paper's table, s; on a slower rig the first is that of small swings."""
 PEAKS: Final = (1.2, 2.53)  # Peaks of the paper's table, rad
-
-ROUGH: Final = (
-    "no errors of periods and peaks: the angle is computed from an acceleration, too inaccurate "
-    "to judge a model: use the residual of the acceleration"
-)
-"""Reason why a record of an acceleration alone has no table."""
 
 _SAME: Final = 1e-9  # Interval below which events are identical, s
 
@@ -162,11 +155,10 @@ def errors_of(method: str, peaks: Peaks, times: Floats, angles: Floats) -> PeakE
 def table1(
     record_peaks: Peaks,
     identifications: Mapping[str, Identification],
-    *,
-    periods: Sequence[float] = PERIODS,
-    peaks: Sequence[float] = PEAKS,
 ) -> Table1:
     """Compare simulations of identified models from the first peak with a record.
+
+    The rows have the measured periods and peaks nearest to those of the paper's table.
 
     Parameters
     ----------
@@ -174,8 +166,6 @@ def table1(
         Peaks of the record, as from :func:`pendmap.identification.find_peaks`.
     identifications : mapping of str to Identification
         ``methods`` of :func:`pendmap.identify`; inapplicable ones are ignored.
-    periods, peaks : sequence of float
-        Rows of the table: the measured period (s) or peak (rad) nearest to each is used.
 
     Returns
     -------
@@ -198,17 +188,10 @@ def table1(
             lost[name] = str(error)
     # One measured value may be nearest to several values of the paper.
     rows: dict[tuple[str, float], Row] = {}
-    for what, asked in [*(("period", t) for t in periods), *(("peak", a) for a in peaks)]:
+    for what, asked in [*(("period", t) for t in PERIODS), *(("peak", a) for a in PEAKS)]:
         if row := _row(what, asked, errors):
             rows.setdefault((what, row.measured), row)
     return Table1(tuple(rows.values()), errors, lost=lost)
-
-
-def table_of_run(run: Run, peaks: Peaks, identifications: Mapping[str, Identification]) -> Table1:
-    """Return table 1 of a run; empty if its angle was computed from an acceleration."""
-    if run.accelerometer is not None:
-        return Table1((), {}, ROUGH)
-    return table1(peaks, identifications)
 
 
 def _row(what: str, asked: float, errors: Mapping[str, PeakErrors]) -> Row | None:

@@ -70,7 +70,7 @@ def covariance_of(notes: Mapping[str, Any]) -> Covariance | None:
         )
     for name, deviation in between.items():
         matrix[names.index(name), names.index(name)] += check_number(name, deviation) ** 2
-    places = [k for k, name in enumerate(names) if "[" not in name and name not in ("bias", "tilt")]
+    places = [k for k, name in enumerate(names) if "[" not in name and name != "bias"]
     return Covariance(tuple(names[k] for k in places), matrix[np.ix_(places, places)])
 
 

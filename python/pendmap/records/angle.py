@@ -1,4 +1,4 @@
-"""Rules of the angle: read, integrated, or computed from pixels or an acceleration."""
+"""Rules of the angle: read, integrated from a gyroscope, or computed from pixels."""
 
 from __future__ import annotations
 
@@ -9,16 +9,12 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.polynomial.legendre import legvander
 
-from pendmap.errors import InputError
 from pendmap.formatting import counted
-from pendmap.records.by_hand import by_hand
-from pendmap.records.noise import noise_of
-from pendmap.records.rod_sensors import FEWEST_PEAKS, PLACE_EXAMPLE, angle_of_rate
+from pendmap.records.experiment import Gyroscope
 from pendmap.signal.half_cycles import swings
 from pendmap.signal.robust import normal_scale
 
 if TYPE_CHECKING:
-    from pendmap.records.rod_sensors import Accelerometer
     from pendmap.records.work import Work
     from pendmap.signal import Floats, Mask
     from pendmap.tables.findings import Finding
@@ -27,10 +23,6 @@ WRAPPED_SPAN: Final = 1.01  # Greatest span of wrapped readings, turns: one turn
 WRAP_JUMP: Final = 0.75  # Least jump between neighbours that is a wrap, turns
 LARGEST_ANGLE: Final = 1e5  # Greatest plausible angle, rad: about 16,000 turns
 MOST_HUGE: Final = 0.5  # Share of implausible angles above which the column is refused
-LEAST_SWING: Final = 5.0  # Least reading of a swing, standard deviations of the noise
-LARGEST_READING: Final = 1.15  # Greatest reading, over the theoretical maximum: else wrong unit
-ONE_SIDED: Final = 0.15  # Smaller over larger side of the readings below which the axis is radial
-BLIND_SPOT: Final = 0.05  # Relative distance to the centre of oscillation that is refused
 DRIFT_DEGREE: Final = 8  # Degree of the polynomials of time along which a camera drifts
 OFF_CIRCLE: Final = 0.3  # Greatest distance of places from a circle, over their spread, rms
 BLOCKS: Final = 30  # Blocks of a record that give the error of a radius
@@ -56,127 +48,31 @@ def source_missing(work: Work) -> Finding | None:
         return None
     if "pixel_x" in work.extra:
         return _finite(work, "position", work.extra["pixel_x"], work.extra["pixel_y"])
-    if "velocity" in work.extra:
-        return _finite(work, "velocity", work.extra["velocity"])
-    _placed(work)
-    return _finite(work, "acceleration", work.extra["acceleration"])
+    return _finite(work, "velocity", work.extra["velocity"])
 
 
 def _finite(work: Work, what: str, *values: Floats) -> Finding | None:
     """Remove rows in which a required channel has no number."""
     good = np.all([np.isfinite(v) for v in values], axis=0)
     if good.size and not good.any():
-        raise InputError(
-            f"{work.where}: the {what} must be numbers, no row has a number for it"
-            f"{work.other('angle')}"
-        )
+        work.refuse(f"the {what} must be numbers, no row has a number for it", **work.other())
     finding = work.leave_out(~good, "angle-missing", "row", channel=what)
     work.refuse_short()
     return finding
 
 
 def derived(work: Work) -> Finding | None:
-    """Compute the angle from pixels, a velocity or an acceleration, in this order."""
-    given = "angle" in work.columns or work.peaks_only
-    if "acceleration" in work.extra and (given or {"pixel_x", "velocity"} & work.extra.keys()):
+    """Compute the angle from pixels or else a velocity."""
+    if "acceleration" in work.extra:
         work.note("acceleration-unused")
-    if given:
+    if "angle" in work.columns or work.peaks_only:
         return None
     if "pixel_x" in work.extra:
         return _circle_angle(work, work.extra.pop("pixel_x"), work.extra.pop("pixel_y"))
-    if "velocity" in work.extra:
-        rate = work.extra["velocity"]
-        work.theta = angle_of_rate(work.time, rate, np.abs(rate) < LARGEST_ANGLE)
-        work.integrated = True
-        return work.finding("angle-integrated")
-    reading, sensor = work.extra["acceleration"], _placed(work)
-    work.theta, work.accelerometer = _sine_of_angle(work.time, reading, sensor, work.where)
-    place = "an angular acceleration"
-    if sensor.direction != "angular":
-        removed = f"g = {sensor.gravity:g} m/s^2" if sensor.gravity else "gravity removed"
-        place = f"a tangential acceleration {sensor.distance_m:g} m from the pivot, {removed}"
-    return work.finding("angle-from-acceleration", place=place)
-
-
-def _placed(work: Work) -> Accelerometer:
-    """Return the accelerometer of a record; InputError if no angle follows from it alone."""
-    sensor = work.accelerometer
-    if sensor is None:
-        why = (
-            "an acceleration alone gives an angle only if the place of the sensor is known:"
-            f" {work.place_missing} missing in [columns] of experiment.toml: it must be like"
-            f" {PLACE_EXAMPLE}"
-        )
-    elif sensor.direction == "radial":
-        why = (
-            "a radial acceleration alone cannot tell left from right: it must be the tangential one"
-        )
-    elif not work.free:
-        why = "an acceleration alone on a forced run includes the pivot's: it must be a free decay"
-    else:
-        return sensor
-    raise InputError(
-        f"{work.where}: {why}, or the record must also have an angle, a velocity (gyroscope)"
-        f" or pixel_x and pixel_y{work.other('angle')}"
-    )
-
-
-def _sine_of_angle(
-    time: Floats, reading: Floats, sensor: Accelerometer, where: str
-) -> tuple[Floats, Accelerometer]:
-    """Return the sine of the angle of free swings by an acceleration alone, and its sensor.
-
-    Raises InputError if the readings are not those of free swings.
-    """
-    from scipy.special import ellipk
-
-    least = max(LEAST_SWING * np.nan_to_num(noise_of(time, reading).sigma), 1e-12)
-    middle = float(np.median(reading))
-    for _ in range(3):
-        half = swings(time, reading - middle, least=least)
-        if half.peak.size < FEWEST_PEAKS:
-            raise InputError(
-                f"{where}: the acceleration must show {FEWEST_PEAKS} half swings or more if there"
-                f" is no angle, got {half.peak.size}"
-            )
-        middle += float(np.median(half.middle))
-    values, size = reading - middle, np.abs(half.peak[1:-1])
-    blind = size.max() < 2 * least and sensor.gravity
-    low, high = np.quantile(reading, (0.02, 0.98)).tolist()
-    sided = low * high > 0 or min(abs(low), abs(high)) < ONE_SIDED * max(abs(low), abs(high))
-    if sided and sensor.direction != "angular":
-        raise InputError(
-            f'{where}: direction is "tangential", but the readings lie on one side, {low:.3g} to'
-            f" {high:.3g} m/s^2, as those along the rod: it must be the column of the axis across"
-            " the rod"
-        )
-    smaller = np.argsort(size)[: max(size.size // 3, 3)]
-    w0 = 2 * math.pi / float(np.median(half.period[smaller]))
-    for _ in range(20):
-        share = np.minimum(size / max(abs(dataclasses.replace(sensor, w0=w0).gain), 1e-9), 1.0)
-        grown = 2 / math.pi * ellipk(np.sin(np.arcsin(share) / 2) ** 2)
-        w0 = (w0 + 2 * math.pi * float(np.median((grown / half.period)[smaller]))) / 2
-    sensor = dataclasses.replace(sensor, w0=w0)
-    if blind or abs(sensor.distance_m * w0**2 / (sensor.gravity or math.inf) - 1) < BLIND_SPOT:
-        raise InputError(
-            f"{where}: distance_m is {sensor.distance_m:g}, and the readings are hardly more than"
-            " noise, as at the centre of oscillation, g/w0^2 from the pivot, where gravity and the"
-            " swing cancel: only damping is measured there; it must be another place on the rod, or"
-            " an angle must be recorded too"
-        )
-    most, top = abs(sensor.gain), float(np.quantile(size, 0.8))
-    if top > LARGEST_READING * most:
-        raise InputError(
-            f"{where}: the acceleration reaches {top:.3g} {sensor.unit}, and a swing of this period"
-            f" at most {most:.3g}: unit, distance_m, direction or gravity_removed is wrong"
-        )
-    return values / sensor.gain, sensor
-
-
-def of_sine(work: Work) -> None:
-    """Compute the angle of an accelerometer, right below a quarter turn, from its sine."""
-    if work.angle_source is not None:
-        work.theta = np.arcsin(np.clip(work.theta, -1, 1))
+    rate = work.extra["velocity"]
+    work.theta = angle_of_rate(work.time, rate, np.abs(rate) < LARGEST_ANGLE)
+    work.integrated = True
+    return work.finding("angle-integrated")
 
 
 def _circle_angle(work: Work, x: Floats, y: Floats) -> Finding:
@@ -184,10 +80,7 @@ def _circle_angle(work: Work, x: Floats, y: Floats) -> Finding:
     middle = np.array([np.median(x), np.median(y)])
     size = float(np.hypot(np.ptp(x), np.ptp(y)))
     if not size or not math.isfinite(size):
-        raise InputError(
-            f"{work.where}: pixel_x and pixel_y must show a swing, they do not move"
-            f"{work.other('angle')}"
-        )
+        work.refuse("pixel_x and pixel_y must show a swing, they do not move", **work.other())
     u, v = (x - middle[0]) / size, (y - middle[1]) / size
     scaled = 2 * (work.time - work.time[0]) / max(float(np.ptp(work.time)), 1e-12) - 1
     still, moved = (_circle(u, v, legvander(scaled, degree)) for degree in (0, DRIFT_DEGREE))
@@ -195,10 +88,11 @@ def _circle_angle(work: Work, x: Floats, y: Floats) -> Finding:
     (radius, a), b, error, rms = moved if drifts else still
     spread = math.sqrt(float(np.var(u) + np.var(v)))
     if not error < MOST_RADIUS_ERROR * radius or rms > OFF_CIRCLE * spread:
-        more = by_hand(work.where, angle=work.columns["pixel_x"], angle_scale=2.5)
-        raise InputError(
-            f"{work.where}: pixel_x and pixel_y must be positions of a bob on a circle,"
-            f" they lie on none; small swings .4 from the pivot: {more}"
+        work.refuse(
+            "pixel_x and pixel_y must be positions of a bob on a circle, they lie on none; small"
+            " swings .4 from the pivot",
+            angle=work.columns["pixel_x"],
+            angle_scale=2.5,
         )
     speed = np.hypot(np.gradient(u, work.time), np.gradient(v, work.time))
     quick = speed >= np.quantile(speed, 0.8)
@@ -250,11 +144,9 @@ def missing(work: Work) -> Finding | None:
     huge = np.abs(work.theta) > LARGEST_ANGLE
     if np.mean(huge) > MOST_HUGE:
         largest = float(np.nanmax(np.abs(work.theta)))
-        raise InputError(
-            f"{work.where}: angles must be up to {LARGEST_ANGLE:g} rad, got {largest:.3g} rad, too"
-            " large for a pendulum, as counts of 4096 a turn would be:"
-            f" {by_hand(work.where, angle_scale=math.tau / 4096)}"
-        )
+        text = f"angles must be up to {LARGEST_ANGLE:g} rad, got {largest:.3g} rad, too large for a"
+        text += " pendulum, as counts of 4096 a turn would be"
+        work.refuse(text, angle_scale=math.tau / 4096)
     return _finite(work, "angle", np.where(huge, math.nan, work.theta))
 
 
@@ -267,3 +159,45 @@ def wrapped(work: Work) -> Finding | None:
         return None
     work.theta = np.unwrap(work.theta)
     return work.finding("angle-wrapped", at=jumps + 1, jumps=counted(jumps.size, "jump"))
+
+
+OVER_THE_TOP: Final = 4 * math.pi  # Range of angles above which a record contains rotations, rad
+FEWEST_PEAKS: Final = 4  # Fewest turning points from which a drift or a period is estimated
+
+
+def angle_of_rate(time: Floats, rate: Floats, good: Mask | None = None) -> Floats:
+    """Return the integral of a rate about the middle of the swing, less the drift by the bias."""
+    from scipy.interpolate import CubicSpline
+
+    if good is None or np.count_nonzero(good) < 2:
+        good = np.ones(time.size, bool)
+    inside = np.clip(time, time[good][0], time[good][-1])
+    theta = CubicSpline(time[good], rate[good]).antiderivative()(inside)
+    if np.ptp(theta - np.median(theta)) > OVER_THE_TOP:
+        return np.asarray(theta - theta[-1])
+    # Turning points about the straight line through all angles give the middles of the swings.
+    trend = np.polyval(np.polyfit(time, theta, 1), time)
+    half = swings(time, theta - trend)
+    if half.peak_time.size < FEWEST_PEAKS:
+        return np.asarray(theta - np.median(theta))
+    peaks = half.peak + np.interp(half.peak_time, time, trend)
+    middle = dataclasses.replace(half, peak=peaks).middle
+    line = np.polyfit(half.peak_time[1:-1], middle, 1)
+    return np.asarray(theta - np.polyval(line, time))
+
+
+def gyroscope_of(time: Floats, theta: Floats, rate: Floats) -> Gyroscope:
+    """Return the gyroscope with ``w0`` estimated from a rate and its integral."""
+    half = swings(time, theta)
+    # The removed line has the slope of the bias; the median is robust to outliers.
+    bias = float(np.median((rate[1:] + rate[:-1]) / 2 - np.diff(theta) / np.diff(time)))
+    speed, size = np.abs(rate - bias), np.abs(half.peak)
+    swung = (size[:-1] < math.pi) & (size[1:] < math.pi)
+    if not np.any(swung):
+        # A pendulum rotates if its greatest speed exceeds 2 w0.
+        return Gyroscope(float(np.max(speed)) / 2 or 1.0)
+    # The energy of a swing gives th' = 2 w0 sin(A/2) in the middle.
+    middle = (size[:-1] + size[1:]) / 2
+    passing = np.interp(half.crossing[1:-1], time, speed)[swung]
+    w0 = float(np.sum(passing) / np.sum(2 * np.sin(middle[swung] / 2)))
+    return Gyroscope(w0)

@@ -32,7 +32,7 @@ class ByHand(TypedDict, total=False):
     rate_hz : float
         Sampling rate, Hz, of records without a column of times in order.
     from_s, to_s : float
-        End of the span that is used, s on the clock of the record.
+        First and last time that are used, s on the clock of the record.
     counts_per_turn : int
         Counts of the encoder in a turn.
     """

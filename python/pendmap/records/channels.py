@@ -20,8 +20,8 @@ from pendmap.records.guesses import (
     head_of,
     in_order,
     likely,
+    on_circle,
 )
-from pendmap.records.rod_sensors import accelerometer_of
 from pendmap.records.work import Work
 from pendmap.tables.findings import finding_of
 from pendmap.tables.units import (
@@ -29,6 +29,7 @@ from pendmap.tables.units import (
     CHANNELS,
     LENGTHS,
     PIVOT_UNITS,
+    RAW,
     Heading,
     name_and_unit,
     spelling,
@@ -74,11 +75,6 @@ def channels_of(table: Table, description: Description, plan: RunPlan, where: st
         findings.append(finding_of("pivot-unit.missing"))
     unused, questions = _unused(table, {*places.values(), *carried}, places, plan)
     findings += questions
-    sensor, missing = None, ""
-    if "acceleration" in places:
-        head = table.names[places["acceleration"]]
-        gravity = float(known.get("gravity", GRAVITY))
-        sensor, missing = accelerometer_of(asked.get("acceleration", Column()), head, gravity)
     time = values.pop("time")
     return Work(
         where=where,
@@ -94,8 +90,6 @@ def channels_of(table: Table, description: Description, plan: RunPlan, where: st
         findings=[*table.findings, *findings],
         columns=heads,
         unused=unused,
-        accelerometer=sensor,
-        place_missing=missing,
         edge=asked.get("trigger", Column()).edge,
         pivot_unit=pivot_unit,
     )
@@ -173,26 +167,41 @@ def _check(places: dict[str, int], table: Table, where: str, *, timed: bool) -> 
 def _missing(table: Table, places: Mapping[str, int], where: str, *, timed: bool) -> str:
     """Return what misses in a table, and the command that reads it all the same."""
     why, rate, options = "", dict[str, object](), dict[str, object]()
+    places = {**places}
+    sensor = places.pop("acceleration", None)
     columns = likely(table, places, timed=not timed)
+    if sensor is not None and timed:
+        columns = {"angle": sensor}
     free = {*range(len(table.names))} - {*places.values(), *columns.values()}
     if free and not any(channel in ANGLE_CHANNELS for channel in {**places, **columns}):
         columns["angle"] = min(free)
     axes = [] if {*ANGLE_CHANNELS} & {*places} else axes_of(table)
     if axes:
-        columns, why = columns | {"velocity": axes[0]}, ", where a sensor has the axes x, y and z"
+        arc = on_circle(*table.values[:, axes[:2]].T)
+        columns |= {"pixel_x": axes[0], "pixel_y": axes[1]} if arc else {"velocity": axes[0]}
+        why = ", where a sensor or a place has the axes x, y and z"
         columns.pop("angle", None)
     if not timed:
         known = [c for c in places if c in {"angle", "velocity"} or c.startswith("pixel")]
         pair = [c for c in known if c.startswith("pixel")]
         columns |= {c: places[c] for c in pair or known}
-        rate = {} if "time" in columns else {"rate_hz": 100}
+        rate = {} if "time" in columns else {"rate_hz": f"{table.rate or 100:g}"}
     elif "angle" in columns and not axes:
         heading = Heading.of(table.names[columns["angle"]])
         unit = spelling(heading.unit or ("px" if heading.meaning in {"x", "y"} else ""))
-        if unit in LENGTHS:
+        if columns["angle"] == sensor:
+            gain = GRAVITY / CHANNELS["acceleration"].units.get(unit, 1.0)
+            why = (
+                ", where an acceleration across the rod, of small swings, is over g - r w0^2 at r"
+                f" from the pivot, here {gain:.4g} {heading.unit or 'm/s2'}"
+            )
+            options = {"angle_scale": f"{1 / gain:.4g}"}
+        elif unit in LENGTHS:
             length = 400 if unit == "px" else 0.4 / LENGTHS[unit]
             why = f", where a place is over its distance from the pivot, here {length:g} {unit}"
             options = {"angle_scale": f"{1 / length:.4g}"}
+        elif unit in RAW:
+            options = {"angle_scale": 1}
         elif heading.unit is not None:
             why = f", where {heading.unit!r} is not known as a unit"
             options = {"angle_unit": "deg"}

@@ -10,12 +10,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.errors import InputError
 from pendmap.formatting import Estimate, counted, estimate_text, listed, moment
-from pendmap.records.by_hand import by_hand
 from pendmap.records.noise import OUTLIER, raise_degree
 from pendmap.records.resolution import FEWEST_EDGES, logs_edges, spread_stamps
-from pendmap.records.slips import slips_of
+from pendmap.records.steps import slips_of
 from pendmap.records.work import FEWEST_SAMPLES
 from pendmap.signal.local_polynomial import local_fit
 from pendmap.signal.robust import broad_scale, intervals_of
@@ -45,10 +43,7 @@ def missing(work: Work) -> Finding | None:
     """Remove rows without a time; InputError if no row has one."""
     bad = ~np.isfinite(work.time)
     if bad.all():
-        raise InputError(
-            f"{work.where}: the times must be numbers, got no row with a time:"
-            f" {by_hand(work.where, rate_hz=100)}"
-        )
+        work.refuse("the times must be numbers, got no row with a time", rate_hz=100)
     finding = work.leave_out(bad, "time-missing", "row")
     if work.time.size < 2:
         work.refuse_short()
@@ -343,10 +338,10 @@ def unordered(work: Work) -> Finding | None:
         work.keep(np.append(True, np.diff(work.time) > _rounding(work.time)))
         return finding
     if np.mean(false) > MOST_UNORDERED:
-        raise InputError(
-            f"{work.where}: the times must be in order, {np.sum(false)} of {false.size} are out"
-            " of order, and sorted by time the angles are no smooth motion:"
-            f" {by_hand(work.where, rate_hz=100)}"
+        work.refuse(
+            f"the times must be in order, {np.sum(false)} of {false.size} are out of order, and"
+            " sorted by time the angles are no smooth motion",
+            rate_hz=100,
         )
     return work.leave_out(false, "time-backwards.left-out", "time stamp")
 
@@ -373,10 +368,7 @@ def _smoother(theta: Floats, at: Indices) -> bool:
 def gaps(work: Work) -> Finding | None:
     """Report gaps, and uneven or jittering intervals; InputError for times that do not increase."""
     if work.time.size < 2 or not work.time[-1] > work.time[0]:
-        raise InputError(
-            f"{work.where}: the times must be in order, they do not increase:"
-            f" {by_hand(work.where, rate_hz=100)}"
-        )
+        work.refuse("the times must be in order, they do not increase", rate_hz=100)
     steps, intervals = np.diff(work.time), intervals_of(work.time)
     usual, at = intervals.tick, intervals.gaps
     if at.size > steps.size / 4:
@@ -414,11 +406,8 @@ def cut(work: Work) -> Finding | None:
         return None
     work.keep((work.time >= low) & (work.time <= high))
     if work.time.size < FEWEST_SAMPLES:
-        raise InputError(
-            f"{work.where}: from_s and to_s must be times within {first:g} to {last:g} s, they"
-            f" leave {counted(work.time.size, 'sample')}:"
-            f" {by_hand(work.where, from_s=first, to_s=last)}"
-        )
+        text = f"from_s and to_s must be times within {first:g} to {last:g} s, they leave"
+        work.refuse(f"{text} {counted(work.time.size, 'sample')}", from_s=first, to_s=last)
     samples, low, high = counted(work.time.size, "sample"), max(low, first), min(high, last)
     return work.finding("cut", samples=samples, begin=moment(low), end=moment(high))
 

@@ -18,14 +18,13 @@ from pendmap.errors import (
     short_repr,
 )
 from pendmap.tables.text import Reader
-from pendmap.tables.units import ANGULAR_ACCELERATIONS, CHANNELS, PIVOT_UNITS, spelling
+from pendmap.tables.units import CHANNELS, PIVOT_UNITS, spelling
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
 T = TypeVar("T")
 Kind = Literal["free", "forced"]
-Direction = Literal["tangential", "radial", "angular"]
 
 NAME: Final = "experiment.toml"
 RATE: Final = "rate_hz"
@@ -56,24 +55,14 @@ class Rig:
 
 @dataclasses.dataclass(frozen=True)
 class Column:
-    """Column of a channel; position of an accelerometer, edge of a trigger."""
+    """Column of a channel; edge of a trigger."""
 
     name: str | int | None = _key(COLUMN)  # heading, or number from 1
     unused: bool = _key(bool, default=False)  # no column has this channel
     unit: str | None = _key(str)
     scale: float | None = _key(NUMBER)  # SI unit per unit of the column
     zero: float = _key(NUMBER, 0.0)  # in the unit of the column
-    direction: Direction | None = _key(["tangential", "radial", "angular"])  # noqa: RUF009
-    distance_m: float | None = _key((1e-6, 100.0))  # from the pivot
-    gravity_removed: bool | None = _key(bool)
     edge: str | None = _key(["rising", "falling"])
-
-
-# Channels of the keys of a column that one channel has alone
-ONLY_OF: Final = {
-    **dict.fromkeys(("direction", "distance_m", "gravity_removed"), "acceleration"),
-    "edge": "trigger",
-}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -213,21 +202,13 @@ def _column(channel: str, value: object, *, counts: bool) -> Column:
     """Return the checked column of a channel."""
     where = f"[columns]: {channel}"
     value = {"name": value} if isinstance(value, str | int) else value
-    others = [key for key, only in ONLY_OF.items() if only != channel]
-    column = _parsed(Column, where, value, others)
+    column = _parsed(Column, where, value, () if channel == "trigger" else ("edge",))
     if column.scale == 0:
         raise InputError(f"{where}: scale must be any number but 0, got 0")
     if column.unit is None or column.scale is not None:
         return column
     if counts and channel == "angle" and spelling(column.unit) == "counts":
         return column
-    angular = spelling(column.unit) in ANGULAR_ACCELERATIONS
-    if column.direction is not None and angular != (column.direction == "angular"):
-        units = "m/s2 or g" if angular else "rad/s2 or deg/s2"
-        raise InputError(
-            f"{where}: unit must be {units} with direction {column.direction!r}, got"
-            f" {column.unit!r}"
-        )
     CHANNELS[channel].factor(column.unit, where)  # refuses unknown units before files are read
     return column
 

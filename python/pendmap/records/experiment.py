@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from pendmap.records.description import Kind
-    from pendmap.records.rod_sensors import Accelerometer, Gyroscope
     from pendmap.signal import Floats, Mask
     from pendmap.tables.findings import Finding
 
@@ -42,6 +41,13 @@ class Segment:
     from_s: float
     to_s: float
     used: bool
+
+
+@dataclasses.dataclass(frozen=True)
+class Gyroscope:
+    """Gyroscope from whose readings alone the angle was computed."""
+
+    w0: float  # rad/s, from speeds in the middle of swings: its reading over a small angle
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -71,8 +77,6 @@ class Run:
         Measured velocity, rad/s, if any.
     acceleration : ndarray, shape (N,), or None
         Measured acceleration, m/s^2 (or rad/s^2), if any.
-    accelerometer : Accelerometer or None
-        Position of the accelerometer, if the angle was computed from it alone.
     gyroscope : Gyroscope or None
         The gyroscope, if the angle was computed from it alone.
     drive : mapping or None
@@ -112,7 +116,6 @@ class Run:
     hold_out: bool = False
     velocity: Floats | None = None
     acceleration: Floats | None = None
-    accelerometer: Accelerometer | None = None
     gyroscope: Gyroscope | None = None
     drive: Mapping[str, float | None] | None = None
     pivot: Mapping[str, Floats] | None = None
@@ -161,15 +164,9 @@ class Run:
         return not self.moves and any(finding.what == "same-record" for finding in self.findings)
 
     @property
-    def rod_sensor(self) -> Accelerometer | Gyroscope | None:
-        """Accelerometer or gyroscope whose readings are fitted instead of the angle."""
-        return self.accelerometer or self.gyroscope
-
-    @property
     def read(self) -> Floats:
-        """Readings that are fitted, in the unit of their sensor, shape (N,)."""
-        made_of = self.acceleration if self.accelerometer else self.velocity
-        return self.theta if self.rod_sensor is None or made_of is None else made_of
+        """Readings that are fitted, shape (N,): rad, or rad/s of a gyroscope."""
+        return self.theta if self.gyroscope is None or self.velocity is None else self.velocity
 
     @property
     def rate_hz(self) -> float:

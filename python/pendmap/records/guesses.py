@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.tables.findings import finding_of
-from pendmap.tables.units import CHANNELS, Heading, spelling
+from pendmap.tables.units import CHANNELS, LENGTHS, Heading, spelling
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from pendmap.tables.text import Table
 
 # Channels from which an angle can be computed
-ANGLE_CHANNELS: Final = ("angle", "velocity", "pixel_x", "pixel_y", "acceleration", "peaks")
+ANGLE_CHANNELS: Final = ("angle", "velocity", "pixel_x", "pixel_y", "peaks")
 POSITION_AGREES: Final = 0.9  # Least correlation of a position with the integrated velocity
 RISING: Final = 0.9  # Least share of rising steps of a clock
 DECAYED: Final = 0.9  # Greatest spread of a decayed last quarter, over that of the first
@@ -30,6 +30,7 @@ LEAST_FILLED: Final = 0.1  # Least share of the rows in which a column of readin
 ON_ARC: Final = 0.7  # Greatest distance from a circle, over that from a line, of places on an arc
 COPIED: Final = 0.9999  # Least correlation of the readings of a copy in another unit
 BY_UNIT: Final = 4  # Rank of a heading that fits by its unit alone
+_AXES: Final = {"x", "y", "z"}
 UNNAMED: Final = 9  # Rank of a heading that says nothing
 
 
@@ -37,8 +38,11 @@ def guess(table: Table, places: dict[str, int], *, timed: bool) -> list[Finding]
     """Assign missing channels by the words and units of headings, or without names by values."""
     by = _by_name if any(table.names) else likely
     guessed = by(table, places, timed=timed)
-    if axes_of(table):  # of a sensor: no places
-        guessed = {c: k for c, k in guessed.items() if not c.startswith("pixel")}
+    axes = axes_of(table)
+    guessed = {c: k for c, k in guessed.items() if k not in axes}
+    if axes and table.names[axes[0]].strip().lower() not in _AXES:  # of a place, not of a sensor
+        plane = zip(("pixel_x", "pixel_y"), axes[:2], strict=True)
+        guessed |= {channel: k for channel, k in plane if channel not in places}
     if "time" in places and any(channel in places for channel in ANGLE_CHANNELS):
         guessed = {c: k for c, k in guessed.items() if c in {"velocity", "trigger"}}
     # An angle given with pixel coordinates was computed from them.
@@ -67,7 +71,7 @@ def _by_name(table: Table, places: dict[str, int], *, timed: bool) -> dict[str, 
         heads = {k: Heading.of(name) for k, name in enumerate(table.names) if k not in taken}
         best = [] if channel in places else _fitting(table, channel, heads, timed=timed)
         if len(best) > 1 and channel in {"angle", "velocity", "acceleration"}:  # of axes the widest
-            best = _decaying(table, best)
+            best = [k for k in best if decays(table.values[:, k])] or best  # a drive does not
             factors = [CHANNELS[channel].units.get(spelling(heads[k].unit or ""), 1) for k in best]
             columns = table.values[:, best] * factors
             spread = np.std(np.where(np.isfinite(columns), columns, 0.0), axis=0)
@@ -97,9 +101,15 @@ def _nameless(head: Heading, letters: str) -> bool:
 
 
 def axes_of(table: Table) -> list[int]:
-    """Return the columns x, y and z without a unit, the axes of a sensor, the widest first."""
-    axes = [k for k, name in enumerate(table.names) if name.strip().lower() in {"x", "y", "z"}]
-    return sorted(axes, key=lambda k: -np.nanstd(table.values[:, k])) if len(axes) == 3 else []
+    """Return the columns x, y, z of a sensor or a place: the widest, then that on its arc."""
+    columns, names = table.values.T, [name.strip().lower() for name in table.names]
+    for k in range(len(names) - 2):
+        heads = [Heading.of(name) for name in names[k : k + 3]]
+        place = heads[0].unit in LENGTHS or {"pendulum", "position"} & {*heads[0].meanings}
+        if {head.name[-1:] for head in heads} == _AXES and (place or names[k] in _AXES):
+            first, *rest = sorted((k, k + 1, k + 2), key=lambda k: -np.nanstd(columns[k]))
+            return [first, *sorted(rest, key=lambda k: not on_circle(columns[first], columns[k]))]
+    return []
 
 
 def _nameless_angle(table: Table, places: Mapping[str, int]) -> dict[str, int]:
@@ -118,11 +128,6 @@ def decays(values: Floats) -> bool:
     """Return whether the spread of a column falls by a tenth from its first to its last quarter."""
     first, *_, last = np.array_split(values[np.isfinite(values)], 4)
     return bool(last.size) and float(np.std(last)) < DECAYED * float(np.std(first))
-
-
-def _decaying(table: Table, columns: list[int]) -> list[int]:
-    """Return the columns that decay, which a drive does not; all if none does."""
-    return [k for k in columns if decays(table.values[:, k])] or columns
 
 
 def rises(values: Floats) -> bool:
@@ -242,6 +247,6 @@ def head_of(table: Table, place: int) -> str:
 
 
 def changes(values: Floats) -> bool:
-    """Return whether a column has at least two different values."""
-    seen = values[np.isfinite(values)]
-    return bool(seen.size) and float(np.ptp(seen)) > 0
+    """Return whether a column has different values, which do not just number the readings."""
+    steps = np.diff(values[np.isfinite(values)])
+    return bool(np.any(steps != 0) and np.any(steps != 1))

@@ -7,13 +7,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.errors import InputError
 from pendmap.formatting import counted, listed, moment
-from pendmap.records.by_hand import by_hand
-from pendmap.records.driven import half_cycles
+from pendmap.records.angle import gyroscope_of
 from pendmap.records.experiment import Segment
-from pendmap.records.releases import releases
-from pendmap.records.rod_sensors import gyroscope_of
+from pendmap.records.releases import half_cycles, releases
 from pendmap.records.scale import middle_of, periods_of
 from pendmap.signal.local_polynomial import local_fit
 from pendmap.signal.robust import between, normal_scale, stretches, widened
@@ -24,7 +21,6 @@ if TYPE_CHECKING:
     from pendmap.tables.findings import Finding
 
 STILL_SPAN: Final = 8.0  # Range of readings below which there is no motion, over the noise
-FOLDED: Final = 0.97  # Reading over the gain, of an accelerometer, near a quarter turn
 NOISE_SPAN: Final = 0.1  # Range, rad, below which readings dominated by noise show no motion
 FAR_HOLD: Final = 0.05  # Distance of a hold from the middle of the swings, over their range
 FEWEST_HALF_CYCLES: Final = 5  # Fewest half cycles of a release that is a run, about three swings
@@ -36,9 +32,7 @@ def moves(work: Work) -> Finding | None:
     low, high = float(work.time[0]), float(work.time[-1])
     work.segments = [Segment("motion", low, high, used=True)]
     if np.ptp(work.theta) == 0:
-        raise InputError(
-            f"{work.where}: must be a motion, the angle never changes{work.other('angle')}"
-        )
+        work.refuse("must be a motion, the angle never changes", **work.other())
     _measure_noise(work)
     good = work.theta[work.trusted]
     spread = float(np.ptp(good)) if good.size else 0.0
@@ -70,20 +64,16 @@ def free_motions(work: Work) -> Finding | None:
     if not work.free:
         return None
     _measure_noise(work)
-    good, w0, middle = work.trusted, work.known.get("w0"), 0.0
-    if work.angle_source is not None:
-        w0 = work.angle_source.w0
-    else:
-        middle = _middle(work)
-        periods = periods_of(work.time[good], work.theta[good] - middle, work.count)
-        w0 = w0 if periods is None else 2 * math.pi / periods.small
+    good, w0, middle = work.trusted, work.known.get("w0"), _middle(work)
+    periods = periods_of(work.time[good], work.theta[good] - middle, work.count)
+    w0 = w0 if periods is None else 2 * math.pi / periods.small
     if not w0:
         return work.finding("no-swing")
     work.middle, work.period = middle, 2 * math.pi / w0
     span = _trusted_span(work)
     parts = [(a, b) for a, b in between(_still(work, span), *span) if b - a > 5]
     work.parts = releases(work, parts)
-    return None if work.angle_source is None else _below_a_quarter_turn(work)
+    return None
 
 
 def _middle(work: Work) -> float:
@@ -97,21 +87,6 @@ def _middle(work: Work) -> float:
     if before is None or abs(before - middle) <= FAR_HOLD * float(np.ptp(theta)):
         return middle
     return before
-
-
-def _below_a_quarter_turn(work: Work) -> Finding | None:
-    """Begin each motion where an acceleration shows swings below a quarter turn."""
-    parts, late = [], []
-    for low, high in work.parts:
-        good, sine, half = half_cycles(work, (low, high))
-        folded = work.time[good][np.abs(sine) > FOLDED]
-        after = half.crossing[half.crossing > folded[-1]] if folded.size else folded
-        begin = int(np.searchsorted(work.time, after[0])) if after.size else low
-        late += [moment(work.time[begin])] if begin > low else []
-        parts += [(begin, high)] if high - begin > 5 else []
-    work.parts = parts
-    times = listed(late, MOST_LISTED)
-    return work.finding("acceleration-folded", times=times) if late else None
 
 
 def _trusted_span(work: Work) -> Stretch:
@@ -146,13 +121,6 @@ def used_motions(work: Work) -> Finding | None:
     work.releases = [part for part, use in zip(work.parts, used, strict=True) if use]
     spans = [f"{moment(work.time[a])} to {moment(work.time[b - 1])} s" for a, b in work.parts]
     taken = [text for text, use in zip(spans, used, strict=True) if use]
-    if work.angle_source is not None and len(taken) > 1:
-        low, high = work.releases[0]
-        span_of = {"from_s": float(work.time[low]), "to_s": float(work.time[high - 1])}
-        raise InputError(
-            f"{work.where}: an acceleration without an angle must be of one release, got"
-            f" {len(taken)}, of {listed(taken, MOST_LISTED)}: {by_hand(work.where, **span_of)}"
-        )
     _settle(work, used, span)
     if len(used) < 2:
         return None
@@ -204,7 +172,7 @@ def held_or_at_rest(work: Work) -> None:
         return
     first, last = work.segments[0], work.segments[-1]
     begins = {"held": "held-start", "driven": "driven-start"}.get(first.what)
-    ends = {"driven": "braked-end", "rest": "rest-tail"}.get(last.what)
+    ends = {"driven": "braked-end", "handled": "handled-end", "rest": "rest-tail"}.get(last.what)
     if begins:
         begin = moment(work.segments[1].from_s)
         work.note(begins, span=(first.from_s, first.to_s), begin=begin)

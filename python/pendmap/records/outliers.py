@@ -14,11 +14,10 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.formatting import counted, moment
+from pendmap.records.angle import angle_of_rate
 from pendmap.records.clock import longest_between
 from pendmap.records.noise import DEGREES, fastest
-from pendmap.records.rod_sensors import angle_of_rate
-from pendmap.records.slips import MOST_INTERVALS, slips_of
-from pendmap.records.steps import sides_of
+from pendmap.records.steps import MOST_INTERVALS, sides_of, slips_of
 from pendmap.records.work import Jump
 from pendmap.signal.local_polynomial import POINTS, local_fit
 from pendmap.signal.robust import broad_scale, normal_scale, widened
@@ -323,12 +322,10 @@ def _whole(jump: Jump, count: float) -> int:
 
 
 def spikes(work: Work) -> Finding | None:
-    """Mark readings of a sensor on the rod far from all their neighbours; steps are none."""
+    """Mark readings of a rate far from all their neighbours; steps are none."""
     from scipy.ndimage import median_filter
 
-    sensor = work.angle_source
-    # The acceleration is checked, since the angle computed from it has corners.
-    values = work.extra["velocity"] if sensor is None else work.extra["acceleration"]
+    values = work.extra["velocity"]
     fit = local_fit(work.time, values)
     size = np.abs(fit.residual)
     if size.size < POINTS:
@@ -338,8 +335,8 @@ def spikes(work: Work) -> Finding | None:
     at = fit.middle[(size > limit) & (np.abs(away[fit.middle]) > limit)]
     if at.size > MOST_OUTLIERS * values.size:
         return None
-    worst, unit = np.max(np.abs(away[at]), initial=0.0), "rad/s" if sensor is None else sensor.unit
-    return work.distrust(at, "outliers", "outlier", worst=worst, unit=unit)
+    worst = np.max(np.abs(away[at]), initial=0.0)
+    return work.distrust(at, "outliers", "outlier", worst=worst, unit="rad/s")
 
 
 def integrate_again(work: Work) -> None:
@@ -367,24 +364,19 @@ def false_ends(time: Floats, theta: Floats, trusted: Mask, limit: float, count: 
 
 def _missed_at_end(lag: Floats, theta: Floats, limit: float, count: float) -> Mask:
     """Return the mask of outliers among the first readings, tested from the inside outward."""
-    inner = np.arange(END_SAMPLES, lag.size - POINTS)
-    tried = {
-        degree: normal_scale(theta[inner] - _before(lag, theta, inner, degree))
-        for degree in END_DEGREES
-    }
-    degree = min(tried, key=tried.__getitem__)
-    missed = np.zeros(END_SAMPLES, bool)
+
+    def missed(k: int, degree: int) -> float:
+        """Return how far a reading is from the polynomial through the nine after it."""
+        after = slice(k + 1, k + 1 + POINTS)
+        return float(theta[k] - np.polyfit(lag[after] - lag[k], theta[after], degree)[-1])
+
+    inner = range(END_SAMPLES, lag.size - POINTS)
+    usual = {d: normal_scale(np.array([missed(k, d) for k in inner])) for d in END_DEGREES}
+    degree = min(usual, key=usual.__getitem__)
+    false = np.zeros(END_SAMPLES, bool)
     for k in range(END_SAMPLES - 1, -1, -1):
-        there = float(_before(lag, theta, np.array([k]), degree)[0])
-        if abs(theta[k] - there) > limit * tried[degree] + 2 * count:
-            missed[k] = True
-            theta[k] = there
-    return missed
-
-
-def _before(lag: Floats, theta: Floats, places: Indices, degree: int) -> Floats:
-    """Return predictions from polynomials fitted to the nine samples after each index."""
-    behind = places[:, None] + np.arange(1, POINTS + 1)
-    x = lag[behind] - lag[places, None]
-    powers = (x / x[:, -1:])[:, :, None] ** np.arange(degree + 1)
-    return np.asarray(np.einsum("mp,mp->m", np.linalg.pinv(powers)[:, 0, :], theta[behind]))
+        away = missed(k, degree)
+        if abs(away) > limit * usual[degree] + 2 * count:
+            false[k] = True
+            theta[k] -= away
+    return false

@@ -13,18 +13,17 @@ from pendmap.errors import InputError, named, short_repr
 from pendmap.files import read_toml
 from pendmap.formatting import counted, listed
 from pendmap.records.across import checked_together
+from pendmap.records.angle import gyroscope_of
 from pendmap.records.by_hand import FRAME, GIVEN, ByHand, by_keyword, name_columns, override
 from pendmap.records.channels import channels_of
 from pendmap.records.description import NAME, Description, RunPlan, description_of
 from pendmap.records.experiment import Experiment, Run
 from pendmap.records.guesses import side_by_side
-from pendmap.records.rod_sensors import gyroscope_of
 from pendmap.records.rules import OF_RELEASE, RULES, apply
 from pendmap.records.work import Work
 from pendmap.tables.findings import Finding, finding_of
 from pendmap.tables.formats import TABLES, read_table
-from pendmap.tables.frames import frame_of
-from pendmap.tables.table import table_of
+from pendmap.tables.table import frame_of, table_of
 
 if TYPE_CHECKING:
     from typing import Unpack
@@ -303,7 +302,6 @@ def _run(work: Work, name: str, digest: str) -> Run:
         hold_out=plan.hold_out,
         velocity=work.extra.get("velocity"),
         acceleration=work.extra.get("acceleration"),
-        accelerometer=work.angle_source,
         gyroscope=gyroscope,
         drive=dataclasses.asdict(plan.drive) if plan.drive else None,
         pivot=work.pivot or None,

@@ -1,7 +1,10 @@
-"""Resolution of readings: their step, encoder edges, and whether they suffice for a fit.
+"""Resolution of readings: their step, encoder edges, and whether they suffice; steps of a pivot.
 
 An encoder that logs each edge has no readings between edges; its angles are exact, its stamps have
 errors: ``theta_k = (n_k - sign(n_k - n_(k-1)) / 2) * step``.
+
+A step ``s`` of a pivot's position sampled every ``h`` seconds is one of ``s / h^2`` in its
+acceleration (1000 m/s^2 for 1 mm at 1 kHz): stepwise positions are smoothed by cubics.
 """
 
 from __future__ import annotations
@@ -14,6 +17,8 @@ import numpy as np
 from pendmap.formatting import counted, moment
 from pendmap.records.by_hand import by_hand
 from pendmap.records.scale import GAIN_KNOWN, gain_of
+from pendmap.signal.local_polynomial import local_fit
+from pendmap.signal.robust import even_times
 
 if TYPE_CHECKING:
     from pendmap.records.work import Work
@@ -24,8 +29,9 @@ NYQUIST: Final = 2.0  # Fewest readings per period of the drive that resolve it
 LEFT_OUT: Final = 0.1  # Share of readings in motion that a fit may leave out without a warning
 MOVING: Final = ("motion", "driven", "handled")  # Segments that may belong to a decay
 # Findings that leave readings in motion out
-REASONS: Final = ["acceleration-folded", "braked-end", "clipped", "driven-start", "frozen"]
-LEAVES_OUT: Final = [*REASONS, "missed-counts", "outliers", "several-releases", "trigger-release"]
+ENDS: Final = ["braked-end", "driven-start", "handled-end", "held-start"]
+REASONS: Final = ["clipped", "frozen", "missed-counts", "outliers"]
+LEAVES_OUT: Final = [*ENDS, *REASONS, "several-releases", "trigger-release"]
 ON_STEPS: Final = 0.12  # Greatest rms distance from multiples of a step, in steps; chance: 0.29
 EDGE_SHARE: Final = 0.95  # Share of single-count steps above which a record is a log of edges
 FEWEST_EDGES: Final = 50  # Fewest readings from which edges are recognized
@@ -58,7 +64,7 @@ def drive(work: Work) -> Finding | None:
 
 def gain(work: Work) -> Finding | None:
     """Report swings too small to determine the gain of the sensor."""
-    free = work.free and work.angle_source is None and not work.integrated
+    free = work.free and not work.integrated
     good = work.trusted
     interval = gain_of(work.time[good], work.theta[good], work.count) if free else None
     if interval is None or interval[1] - interval[0] <= 2 * GAIN_KNOWN:
@@ -122,3 +128,63 @@ def edges(work: Work) -> None:
         work.theta -= 0.5 * work.estimated_step * np.append(way[0], way)
         work.trusted[0] = False  # it may be the initial count, not an edge
         work.trusted[1:] &= way != 0  # a line between two edges or at rest
+
+
+FARTHEST_PIVOT: Final = {"m": 3.0, "m/s": 60.0, "m/s2": 3000.0}  # Greatest plausible span by unit
+PIVOT_ORDER: Final = {"m": 2, "m/s": 1}  # Order of differentiation to an acceleration, by unit
+NOISE_SHARE: Final = 0.05  # Greatest noise of the pivot's acceleration, over its largest value
+LONGEST_WINDOW: Final = 0.2  # Longest window of more than five readings, s
+
+
+def pivot_unit(work: Work) -> Finding | None:
+    """Report a pivot whose motion is implausible in its unit."""
+    for way, values in work.pivot.items():
+        span = float(np.nanmax(values) - np.nanmin(values)) if np.isfinite(values).any() else 0.0
+        if work.pivot_unit and span > FARTHEST_PIVOT[work.pivot_unit]:
+            return work.finding("pivot-unit.wrong", way=way, extent=span, unit=work.pivot_unit)
+    return None
+
+
+def pivot_steps(work: Work) -> Finding | None:
+    """Replace stepwise positions or velocities of the pivot by smooth accelerations."""
+    order = PIVOT_ORDER.get(work.pivot_unit or "", 0)
+    known = all(np.isfinite(values).all() for values in work.pivot.values())
+    if not order or work.time.size < 20 or not known:
+        return None
+    interval, even = even_times(work.time)
+    if not even.size:
+        return None
+    longest, places = 0, {}
+    for way, values in work.pivot.items():
+        places[way] = np.interp(even, work.time, values)
+        if np.ptp(values) > 0:
+            window = _cubic_window(places[way], step_of(values), order, interval)
+            longest = max(longest, window)
+    if longest < 7:
+        return None
+    from scipy.signal import savgol_filter
+
+    for way, values in places.items():
+        pushed = savgol_filter(values, longest, 3, deriv=order, delta=interval)
+        work.pivot[way] = np.interp(work.time, even, pushed)
+    what = "places" if order == 2 else "speeds"
+    work.pivot_unit = "m/s2"
+    seconds = longest * interval
+    return work.finding("pivot-smoothed", what=what, readings=longest, seconds=seconds)
+
+
+def _cubic_window(values: Floats, step: float, order: int, interval: float) -> int:
+    """Return the number of readings to which a cubic is fitted: 5 if no smoothing is needed."""
+    from scipy.signal import savgol_coeffs, savgol_filter
+
+    time = interval * np.arange(values.size, dtype=np.float64)
+    rest = np.abs(local_fit(time, values).residual)
+    felt = rest[rest > 1e-9 * np.ptp(values)]
+    noise = max(step / math.sqrt(12), float(np.median(felt)) if felt.size else 0.0)
+    most = max(min(int(LONGEST_WINDOW / interval), values.size // 4), 5)
+    for window in range(5, most + 1, 2):
+        gain = float(np.linalg.norm(savgol_coeffs(window, 3, deriv=order, delta=interval)))
+        pushed = savgol_filter(values, window, 3, deriv=order, delta=interval)
+        if gain * noise <= NOISE_SHARE * float(np.max(np.abs(pushed))):
+            return window
+    return most - (most + 1) % 2

@@ -13,12 +13,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendmap.errors import InputError
 from pendmap.model.quantities import GRAVITY
-from pendmap.records.by_hand import by_hand
 from pendmap.signal.half_cycles import after_turns, swings
 from pendmap.signal.robust import Z95, normal_scale
-from pendmap.tables.units import DEGREE
+from pendmap.tables.units import DEGREE, name_and_unit
 
 if TYPE_CHECKING:
     from pendmap.records.experiment import Run
@@ -191,10 +189,7 @@ def seconds(work: Work) -> Finding | None:
         if "time" in work.declared:
             return work.finding("time-unit.declared", period=small, unit=name)
         if math.isfinite(work.plan.from_s) or math.isfinite(work.plan.to_s):
-            raise InputError(
-                f"{work.where}: from_s and to_s must be in s, the times look like {name}:"
-                f" {by_hand(work.where, time_unit=name)}"
-            )
+            work.refuse(f"from_s and to_s must be in s, the times look like {name}", time_unit=name)
         finding = work.finding("time-unit.short", period=small, unit=name)
         work.time *= factor
         work.theta *= factor if work.integrated else 1.0
@@ -216,8 +211,13 @@ def radians(work: Work) -> Finding | None:
     largest = float(np.max(periods.amplitude))
     if largest <= math.pi:  # swings are possible
         return None
-    if largest * DEGREE > math.pi or ("velocity" if work.integrated else "angle") in work.declared:
+    channel = "velocity" if work.integrated else "angle"
+    unit = name_and_unit(work.columns.get(channel, ""))[1] or "rad"
+    if channel in work.declared or "rad" not in unit:
         return work.finding("angle-unit.wrong", largest=largest)
+    if largest * DEGREE > math.pi:
+        text = f"swings of {largest:.4g} rad need --angle-scale, or the counts of a turn"
+        work.refuse(text, angle_unit="counts", counts_per_turn=2400)
     work.theta *= DEGREE
     if work.integrated:
         work.extra["velocity"] = work.extra["velocity"] * DEGREE
@@ -229,7 +229,9 @@ def radians(work: Work) -> Finding | None:
 
 def one_sided(work: Work) -> None:
     """Raise InputError for readings of which one side decays alone: no angle does that."""
-    first, *_, last = np.array_split(work.theta[work.trusted], 4)
+    theta = work.theta[work.trusted]
+    moving = np.flatnonzero(np.abs(theta - theta[-1]) > work.limit) if theta.size else theta
+    first, *_, last = np.array_split(theta[: moving[-1] + 1] if moving.size else theta, 4)
     if not work.free or not last.size:
         return
     ends = [np.quantile(part, (0.02, 0.98)) for part in (first, last)]
@@ -237,10 +239,11 @@ def one_sided(work: Work) -> None:
         return
     less, more = sorted(np.abs(ends[1] - ends[0]).tolist())
     if less < ONE_SIDED * more and more > ONE_SIDED * float(np.ptp(work.theta)):
-        raise InputError(
-            f"{work.where}: angles must swing to both sides of the rest, and the decay of"
+        work.refuse(
+            "angles must swing to both sides of the rest, and the decay of"
             f" {work.columns.get('angle')!r} is on one side of it, as of a cosine, a height or an"
-            f" absolute value: another column must be the angle{work.other('angle')}"
+            " absolute value: another column must be the angle",
+            **work.other(),
         )
 
 

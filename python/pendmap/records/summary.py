@@ -167,7 +167,7 @@ def _doubted(finding: Finding) -> bool:
 
 def noise_unit(run: Run) -> str:
     """Return the unit of :func:`noise_floor`."""
-    return "rad" if run.gyroscope is None else run.gyroscope.unit
+    return "rad" if run.gyroscope is None else "rad/s"
 
 
 def noise_said(noise: NoiseFloor, unit: str = "rad") -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
     from pendmap.records.description import RunPlan
     from pendmap.records.experiment import Segment
-    from pendmap.records.rod_sensors import Accelerometer
     from pendmap.signal import Floats, Indices, Mask, Stretch
     from pendmap.tables.findings import Finding
 
@@ -60,9 +59,7 @@ class Work:
     count: float = 0.0  # step of the readings, declared or estimated, rad; 0 for none
     estimated_step: float = 0.0  # step estimated from the readings, rad; 0 for none
     peaks_only: bool = False
-    accelerometer: Accelerometer | None = None
     integrated: bool = False  # the angle is the integral of the velocity
-    place_missing: str = ""  # missing keys of [columns] on the accelerometer's position
     moves: bool = False  # whether the pendulum moves
     jumps: list[Jump] = dataclasses.field(default_factory=list)  # of the reading, not corrected
     bridged: Floats = dataclasses.field(default_factory=lambda: np.empty(0))  # without outliers
@@ -78,17 +75,6 @@ class Work:
     clock_stderr: float = 0.0  # relative standard error of the sampling interval
     zero: float = 0.0  # angle subtracted from the readings, rad
     limit: float = 0.0  # range of readings below which there is no motion, rad
-
-    @property
-    def angle_source(self) -> Accelerometer | None:
-        """Accelerometer from which the angle was computed; None if it was not."""
-        made = self.accelerometer is not None and math.isfinite(self.accelerometer.w0)
-        return self.accelerometer if made else None
-
-    @property
-    def on_rod(self) -> bool:
-        """Whether the angle was computed from a sensor on the rod."""
-        return self.integrated or self.angle_source is not None
 
     @property
     def free(self) -> bool:
@@ -157,18 +143,22 @@ class Work:
             parts.append(part)
         return parts, shared
 
-    def other(self, option: str) -> str:
-        """Return the end of a message: the command that reads another column, if there is one."""
-        return f": {by_hand(self.where, **{option: self.unused[0]})}" if self.unused else ""
+    def other(self) -> dict[str, object]:
+        """Return the option that reads another column as the angle, if there is one."""
+        return {"angle": self.unused[0]} if self.unused else {}
+
+    def refuse(self, text: str, **options: object) -> NoReturn:
+        """Raise InputError, with the command that helps by its options, if there are any."""
+        more = f": {by_hand(self.where, **options)}" if options else ""
+        raise InputError(f"{self.where}: {text}{more}")
 
     def refuse_short(self) -> None:
         """Raise InputError if there are too few samples for a record."""
         least = _FEWEST_PEAKS if self.peaks_only else FEWEST_SAMPLES
         if self.time.size < least:
-            raise InputError(
-                f"{self.where}: must have {least} samples or more with time and angle, got"
-                f" {counted(self.time.size, 'sample')}{self.other('angle')}"
-            )
+            got = counted(self.time.size, "sample")
+            text = f"must have {least} samples or more with time and angle, got {got}"
+            self.refuse(text, **self.other())
 
 
 def _within(part: Finding | Segment, begin: float, end: float) -> bool:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 _NOTHING: Final = frozenset(
     (
         *("", "nan", "na", "n/a", "null", "none", "-", "--", "inf", "+inf", "-inf", "infinity"),
-        *("#n/a", "#div/0!", "#name?", "#null!", "#num!", "#ref!", "#value!"),  # of Excel
+        *("---", "#n/a", "#div/0!", "#name?", "#null!", "#num!", "#ref!", "#value!"),  # of Excel
     )
 )
 # Words that loggers write for the levels of a trigger
@@ -43,6 +43,7 @@ _GROUPED: Final = {
     )
     for sign, other in (".,", ",.")
 }
+_NINES: Final = (99, 999, 9999, 99_999, 99.99, 999.9, 999.99)  # Lost, beyond all readings
 _DOUBT: Final = 0.9  # Weight of a number like 1,234, which may be 1.234
 _DAY: Final = (
     r"\d{4}[-./]\d{1,2}[-./]\d{1,2}|\d{1,2}[-./]\d{1,2}[-./](?:\d{4}|\d\d)"
@@ -50,7 +51,7 @@ _DAY: Final = (
 )
 _CLOCK: Final = re.compile(
     rf"(?P<day>{_DAY})?(?:(?:^|(?<=\d)[T ,_]+)(?P<clock>(?:\d{{1,3}}:)?\d{{1,3}}:\d\d)"
-    r"(?:[.,](?P<point>\d+)|:(?P<ms>\d{3}))?(?: ?(?P<half>[AaPp])\.?[Mm]\.?)?"
+    r"(?:[.,](?P<point>\d+)|:(?P<ms>\d{2,3}))?(?: ?(?P<half>[AaPp])\.?[Mm]\.?)?"
     r" ?(?P<zone>Z|UTC|[+-]\d\d(?::?\d\d)?)?)?"
 )
 _DAY_S: Final = 86_400
@@ -81,8 +82,8 @@ class Column:
 
 
 def split(line: str, delimiter: str) -> list[str]:
-    """Return the cells of a line; the Arduino IDE sets an arrow behind the time of day."""
-    line = line.replace(" -> ", delimiter, 1)
+    """Return the cells of a line; an arrow or brackets set the time of a log apart."""
+    line = re.sub(r"^\[([^]]+)\] ", r"\1 -> ", line).replace(" -> ", delimiter, 1)
     if '"' in line:
         line = " ".join(line.split()) if delimiter == " " else line
         return next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))
@@ -113,6 +114,9 @@ def column_of(cells: list[str], decimal: str) -> Column:
     odd = np.isnan(values)
     odd[odd] = ~texts[odd].str.lower().isin(_NOTHING).to_numpy()
     words = texts[odd]
+    size, nines = np.abs(values), np.isin(np.abs(values), _NINES)
+    others = np.max(size, where=~nines & np.isfinite(size), initial=0.0)
+    values[nines & (size / 2 > others)] = np.nan
     if words.empty:
         return Column("number", values, odd, base)
     middle = words.iloc[words.size // 2]
@@ -167,7 +171,11 @@ def clock_of(cells: pd.Series[str]) -> tuple[Floats, str] | None:
     form = forms[forms > 0].mode()[0]
     good = forms == form
     day, clock, point, ms, half, zone = (parts.loc[good, name] for name in _CLOCK.groupindex)
-    short, point = clock.str.count(":") == 1, point.fillna(ms)
+    short = clock.str.count(":") == 1
+    if ms.str.len().max() == 2:  # hundredths of a second, or frames, of which each number occurs
+        rate = (frames := ms.astype(float)).nunique()
+        ms = (frames / (rate if rate == frames.max() + 1 else 100)).map("{:.6f}".format).str[2:]
+    point = point.fillna(ms)
     if len(zone.unique()) > 1 or (short.any() and (form > 1 or point.isna().all())):
         return None
     since = pd.to_timedelta(clock.mask(short, "0:" + clock) + "." + point.fillna("0"))

@@ -13,12 +13,10 @@ from pendmap.errors import InputError
 from pendmap.files import read_whole
 from pendmap.formatting import listed
 from pendmap.tables.findings import finding_of
-from pendmap.tables.matlab import matlab_frame
+from pendmap.tables.programs import TRACKER, is_workbook, matlab_frame, sheet_text, tracker_frame
 from pendmap.tables.table import MOST_BYTES, decoded, readable, refuse_large, table_of
 from pendmap.tables.text import parsed
-from pendmap.tables.tracker import TRACKER, tracker_frame
 from pendmap.tables.units import Heading
-from pendmap.tables.workbooks import is_workbook, sheet_text
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -29,7 +27,7 @@ _TEXTS: Final = (".csv", ".tsv", ".txt", ".dat")
 _BINARY: Final = (".parquet", ".pq", ".xlsx", ".ods", ".mat", ".trk", ".trz", ".zip")
 # Suffixes of the files that are records in a folder without a description
 TABLES: Final = (*_TEXTS, *_BINARY)
-_ANGLES: Final = ("angle", "velocity", "pixel_x", "acceleration")  # Wanted, best first
+_ANGLES: Final = ("angle", "velocity", "pixel_x")  # Wanted, best first
 _ZIP: Final = b"PK\x03\x04"
 _MOST_MEMBERS: Final = 200  # Most members of an archive
 _MISSING: Final = (

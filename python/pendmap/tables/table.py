@@ -1,10 +1,11 @@
-"""Decoding of text, and tables of DataFrames."""
+"""Decoding of text, and tables of DataFrames and of records in memory."""
 
 from __future__ import annotations
 
 import contextlib
 import re
-from typing import TYPE_CHECKING, Final
+import sys
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from pendmap.errors import InputError
 from pendmap.formatting import counted
 from pendmap.tables.findings import finding_of
 from pendmap.tables.text import MOST_COLUMNS, TIME, Table
+from pendmap.tables.units import name_and_unit
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -102,3 +104,34 @@ def refuse_large(where: str, *, columns: int = 0, size: int = 0) -> None:
     if size > MOST_BYTES:
         most, got = (f"{value / 2**20:.0f} MiB" for value in (MOST_BYTES, size))
         raise InputError(f"{where}: unpacks to {got}: must be at most {most}")
+
+
+def frame_of(records: Any, theta: Any = None) -> pd.DataFrame | None:  # noqa: ANN401 (any form)
+    """Return arrays, or a table of pandas or xarray, as a DataFrame; None for other records."""
+    import pandas as pd
+
+    xarray = sys.modules.get("xarray")  # without it nothing is of its types
+    if theta is not None:
+        parts = {"t_s": records, "theta_rad": theta}
+    elif xarray is not None and isinstance(records, xarray.DataArray | xarray.Dataset):
+        if isinstance(records, xarray.DataArray):
+            records = records.to_dataset(name=records.name or "theta_rad")
+        along = max(records.sizes, key=records.sizes.__getitem__, default="")
+        parts = {name: part for name, part in records.variables.items() if part.dims == (along,)}
+    elif isinstance(records, pd.Series):
+        return records.to_frame(_heading(records, "theta_rad"))
+    else:
+        return records if isinstance(records, pd.DataFrame) else None
+    arrays = [np.asarray(values) for values in parts.values()]
+    shapes = [array.shape for array in arrays]
+    if any(len(shape) != 1 or shape != shapes[0] for shape in shapes):
+        raise InputError(f"times and theta must be of one shape (N,), got {shapes}")
+    heads = [_heading(values, str(name)) for name, values in parts.items()]
+    return pd.DataFrame(dict(enumerate(arrays))).set_axis(heads, axis=1)
+
+
+def _heading(values: Any, usual: str) -> str:  # noqa: ANN401 (an array)
+    """Return the name of an array, with the unit that its attributes give."""
+    name = str(getattr(values, "name", None) or usual)
+    unit = str(getattr(values, "attrs", {}).get("units", "")).partition(" since ")[0]
+    return f"{name_and_unit(name)[0]} [{unit}]" if unit else name

@@ -20,7 +20,7 @@ from pendmap.errors import InputError, short_repr
 from pendmap.formatting import counted, listed
 from pendmap.tables.cells import column_of, counted_since, split, unwrapped, weight
 from pendmap.tables.findings import finding_of
-from pendmap.tables.units import CHANNELS, TIMES, Heading, name_and_unit, spelling
+from pendmap.tables.units import CHANNELS, TIMES, Heading, name_and_unit, spelling, stated_rate
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -45,6 +45,7 @@ _POINT: Final = re.compile(r'(?<=:\d\d),(\d{3}|\d{6})(?=[,;\t|"]|$)')  # of s, b
 _COMMENT: Final = re.compile(r"^\s*(?:[#%!]+|//+|'(?!.*'))\s*")
 _OTHERS: Final = (r"\t", ";", ",", r"\|", r"\s{2,}")  # Separators of names alone
 _WORD: Final = re.compile(r"\S+(?:\s+[(\[][^)\]]*[)\]])?")  # with its unit
+_FRACTION: Final = re.compile(r"(.*?)(s\w*) \1(n|nano|u|micro)_?\2")
 _LETTER: Final = re.compile(r"[^\W\d_]")
 _UNIT: Final = re.compile(r"[(\[]?\s*[^\d\s]{0,8}\d?\s*[)\]]?")
 _ABOVE: Final = 12  # Most lines above the rows that may hold names
@@ -77,6 +78,7 @@ class Table:
     # Index of each row among the lines that are not empty; unreadable lines leave gaps.
     order: Indices = dataclasses.field(default_factory=lambda: np.empty(0, np.intp))
     texts: Mapping[int, str] = dataclasses.field(default_factory=dict)  # a cell of each text column
+    rate: float | None = None  # sampling rate that lines above the columns state, Hz
 
     def __post_init__(self) -> None:
         """Mark readings that are infinite or too large as missing."""
@@ -152,7 +154,8 @@ def parsed(text: str, reader: Reader, where: str, findings: list[Finding]) -> Ta
             texts[k] = f"{short_repr(flat[starts[i] + k])} in line {number[read[i]]}"
     values = np.column_stack([column.values + column.base for column in columns])
     order = read - read[0]
-    return Table(tuple(names), values, number[read], tuple(findings), order, texts)
+    rate = stated_rate(lines[begin : read[0]][-_ABOVE:])
+    return Table(tuple(names), values, number[read], tuple(findings), order, texts, rate)
 
 
 def _form_of(lines: list[str], reader: Reader, where: str) -> tuple[_Form, list[str]]:
@@ -238,6 +241,13 @@ def _longest(
 def _clocks(columns: list[Column], names: list[str]) -> None:
     """Turn times of day, dates and counts since 1970 into s since the first; name a time t_s."""
     days = next((column.values for column in columns if column.parts == "day"), None)
+    for k, (head, part) in enumerate(itertools.pairwise(names)):
+        if match := _FRACTION.fullmatch(f"{head} {part}"):  # sec and nanosec are one clock
+            one, two = columns[k : k + 2]
+            parts = (1e-6 if match[3][0] in "um" else 1e-9) * two.values
+            whole = one.values - one.values[0] + parts
+            columns[k] = dataclasses.replace(one, values=whole, base=0.0)
+            columns[k + 1] = dataclasses.replace(two, values=0.0 * parts)
     moving = []
     for k, column in enumerate(columns):
         name, unit = name_and_unit(names[k])

@@ -33,12 +33,10 @@ LENGTHS: Final[dict[str, float]] = _TABLES["length"]
 RAW: Final = frozenset(_TABLES["raw"])
 DEGREE: Final = ANGLES["deg"]
 SPEEDS: Final = {f"{a}/{t}": ANGLES[a] / TIMES[t] for t in ("s", "min") for a in ANGLES}
-# Units of an angular acceleration, in rad/s^2
-ANGULAR_ACCELERATIONS: Final = {f"{name}/s2": factor for name, factor in ANGLES.items()}
 _ACCELERATIONS: Final = {
     **{f"{name}/s2": factor for name, factor in LENGTHS.items() if name != "px"},
     "g": 9.80665,
-    **ANGULAR_ACCELERATIONS,
+    **{f"{name}/s2": factor for name, factor in ANGLES.items()},
 }
 
 _UNITS: Final[dict[str, str]] = {
@@ -53,6 +51,9 @@ OTHERS: Final = ("drive", "motor", "pivot", "error")
 _WORDS: Final[dict[str, str]] = {
     word: name for name, words in _TABLES["words"].items() for word in words.split()
 }
+_SETTINGS: Final = tuple(words.split() for words in _TABLES["settings"].values())
+_SETTING: Final = re.compile(r"(\d*\.?\d+(?:e[+-]?\d+)?) ?([^\W\d_]*)(?:/s)?$")
+_RATES: Final = (1.0, 1e6)  # Sampling rates that a setting may have, Hz
 _ENDINGS: Final = ("", "s", "es", "n", "en")  # of plurals
 _FIRM: Final = ("velocity", "acceleration", "trigger")  # Meanings that no unit contradicts
 _FURTHER: Final = ("plain", "pendulum", "smooth")  # Meanings of words that follow a unit
@@ -117,6 +118,31 @@ def _folded(text: str) -> str:
     for mark, word in _MARKS:
         text = re.sub(mark, word, text)
     return "".join(letter for letter in text if not unicodedata.combining(letter))
+
+
+def stated_rate(lines: Iterable[str]) -> float | None:
+    """Return the sampling rate, Hz, that lines above a table state, as "Sample rate: 50 Hz" does.
+
+    The number stands behind the words, in the next cell, or in the one below.
+    """
+    cells = [[cell.strip() for cell in re.split(r"[,;\t:=]", _folded(line))] for line in lines]
+    for row, below in zip(cells, [*cells[1:], []], strict=False):
+        for k, cell in enumerate(row):
+            words = {*_TOKENS.findall(cell)}
+            sampling, rate, interval = (any(p in cell for p in parts) for parts in _SETTINGS)
+            rate = (sampling and rate) or "fps" in words
+            if not rate and not (sampling and interval) and not words & {"dt", "increment"}:
+                continue
+            for text in (cell, *row[k + 1 : k + 2], *below[k : k + 1]):
+                match = _SETTING.search(text)
+                if match is None or not float(match[1]):
+                    continue
+                value, unit = float(match[1]), spelling(match[2])
+                value *= 1e3 if unit == "khz" else TIMES.get(unit, 1.0)
+                value = value if rate and unit not in TIMES else 1 / value
+                if _RATES[0] <= value <= _RATES[1]:
+                    return value
+    return None
 
 
 def _stems(word: str) -> Iterator[str]:
@@ -202,7 +228,7 @@ def name_and_unit(header: str) -> tuple[str, str | None]:
     for name, unit in _splits(text):
         if _is_unit(unit):
             return name.strip(), unit.strip()
-    bracket = re.search(r"[\(\[\{]([^()\[\]{}]+)[\)\]\}]$", text)
+    bracket = re.search(r"[\(\[\{](?!\d+.$)([^()\[\]{}]+)[\)\]\}]$", text)
     if bracket and "" in meanings_of(plain(bracket[1]).split() or [""]):
         return text[: bracket.start()].strip(), bracket[1].strip()  # reported if it is needed
     return text, None

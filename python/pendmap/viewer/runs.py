@@ -106,7 +106,7 @@ def of_identification(report: IdentificationReport) -> list[Motion]:
     for k, (one, reading) in enumerate(zip(joint.runs, joint.readings, strict=True)):
         angle, residual = joint.fit.curves[k][0], joint.fit.residuals[k]
         # Errors of a sensor on the rod do not apply to the angle.
-        theta = one.theta - residual if one.rod_sensor is None else angle
+        theta = one.theta - residual if one.gyroscope is None else angle
         theta = np.where(one.trusted & np.isfinite(angle), theta, math.nan)
         made.append(_thinned(one, report.model.w0, [(_look("model"), theta)], reading.sigma))
     return made

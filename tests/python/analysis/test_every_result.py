@@ -46,6 +46,9 @@ SMALL: dict[str, Callable[..., xr.Dataset]] = {
     "bifurcation": lambda model, **more: pendmap.bifurcation(
         model, {"p": [0.5, 0.6]}, starts=2, **more
     ),
+    "continuation": lambda model, **more: pendmap.continuation(
+        model, {"p": (0.5, 1.5)}, 1, 1, longest=2, **more
+    ),
     "orbit": lambda model, **more: pendmap.orbit(
         model, 1, 0, Grid.square(12, model.units.w0), **more
     ),

@@ -44,6 +44,7 @@ SMALL = {
     "map": "--vary gamma 0.3:0.6:3 --p 0.3:0.6:2 --starts 2",
     "sweep": "--vary gamma 0.3:0.6:3 --grid 6 --max-periods 300",
     "bifurcation": "--vary p 0.3:0.6:4 --starts 2",
+    "continue": "--vary gamma 0.3:0.6 --n 1 --w 1 --longest 1",
     "orbit": "--grid 5",
     "lyapunov": "--max-periods 300",
     "lifetime": "--starts 100 --max-periods 300",
@@ -55,6 +56,10 @@ ROWS = {
     "map": {"regimes": {"kinds", "share"}},
     "sweep": {"maps": {"attractors", "undecided"}},
     "bifurcation": {"branches": {"name", "kind", "n", "w", "first", "last"}},
+    "continue": {
+        "branches": {"n", "w", "ends", "from", "to"},
+        "events": {"kind", "value", "theta", "velocity", "n", "w", "multipliers", "supercritical"},
+    },
     "orbit": {"orbits": {"n", "w", "theta", "velocity", "multipliers", "stable"}},
     "tongues": {"curves": {"omega", "p", "multiplier", "stable_above"}},
 }

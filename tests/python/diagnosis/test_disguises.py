@@ -115,6 +115,19 @@ def test_a_knock_is_found_from_half_a_swing_beside_it() -> None:
     assert better.fit["impulses.J"] == pytest.approx(JUMP, rel=0.05)
 
 
+def test_an_instant_moves_on_only_while_that_gains(monkeypatch: pytest.MonkeyPatch) -> None:
+    gains = iter([*[2.0] * 5, *[0.5] * 50])
+
+    def nearer(_data: object, fitted: Any, *_: object) -> Any:  # noqa: ANN401 (a stub)
+        return SimpleNamespace(**vars(fitted) | {"chi2": fitted.chi2 - next(gains)})
+
+    monkeypatch.setattr("pendmap.diagnosis.refit._fit_from", nearer)
+    fit = {"w0": W0, "impulses.J": 0.1, "impulses.t0": 3.0}
+    knock = Candidate("impulses", {"t0": 3.0})
+    model: Any = SimpleNamespace(fit=fit, chosen=(knock,), chi2=99.0, level=1.0)
+    assert try_mirrored_places(None, model).chi2 == 99.0 - 5 * 2.0 - 2 * 0.5  # type: ignore[arg-type]
+
+
 def test_a_hand_at_the_release_is_cut_and_gets_no_name() -> None:
     slow = motion(TIME[TIME < 0.4], (1.2, 0.0), w0=W0, c_over_m=0.05, friction=0.05)
     slope = (slow[-1] - slow[-2]) / 0.02

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from pendmap.diagnosis.fitted_model import fit_model
 from pendmap.diagnosis.state import State
 from pendmap.diagnosis.thresholds import Thresholds
 from pendmap.records import Experiment, Run
-from pendmap.records.rod_sensors import Gyroscope
+from pendmap.records.experiment import Gyroscope
 from pendmap.residuals.torque import residual_torque
 
 TIME = np.arange(1000) * 0.02
@@ -85,7 +86,7 @@ def test_a_lost_run_is_fitted_in_windows_or_set_aside() -> None:
     data = split_records(experiment(*runs))
     windows = [(k, 0, TIME.size, a, 0.0) for k, a in enumerate(starts.values())]
     fitted = fit_model(data, pendmap.Rig(6.2, 0.05, 0.05), ["w0"], windows=windows, steps=0)
-    assert lost_runs(data, fitted) == [2]
+    assert [*lost_runs(data.fitted, fitted.fit)] == [2]
     shorter = baseline.in_windows(data, [2])
     assert [run.longest_s for run in shorter.fitted] == [None, None, pytest.approx(TIME[-1] / 4)]
     left = baseline.set_aside(data, [2])
@@ -93,7 +94,7 @@ def test_a_lost_run_is_fitted_in_windows_or_set_aside() -> None:
     assert [left.runs[k].name for k in left.fitted_of] == ["0", "1"]
     assert {left.runs[k].name for k in left.held_of} == {"0", "1"}
     assert left.runs[2].findings[-1].what == "run-lost"
-    assert baseline.set_aside(data, [0, 1, 2]) is None
+    assert baseline.set_aside(split_records(experiment(runs[0])), [0]) is None
 
 
 def test_what_opposes_the_motion_is_no_start_below_0() -> None:
@@ -144,3 +145,41 @@ def test_far_above_the_noise_damping_effects_are_fitted_outright() -> None:
     assert core.names == ("power_law_drag",)
     result = pendmap.diagnose(run, max_effects=1)
     assert (result.verdict, [e.name for e in result.effects]) == ("named", ["cubic_damping"])
+
+
+def test_the_worst_run_is_set_aside_alone() -> None:
+    """A run that is lost spoils the fit to the others, which are followed without it."""
+    runs = [run_of(decay(a, drag=0.03), str(k), seed=k) for k, a in enumerate((1.5, 0.9, 1.3))]
+    runs[0] = dataclasses.replace(runs[0], theta=runs[0].theta + 0.03 * TIME)
+    data, base, core = baseline.fit_followed(split_records(experiment(*runs)))
+    assert [run.name for run in data.fitted] == ["1", "2"]
+    assert [run.name for run in data.runs if run.findings] == ["0"]
+    assert core is not None
+    assert core.fit["quadratic_drag.q"] == pytest.approx(0.03, rel=0.05)
+    assert core.chi2 < base.chi2
+
+
+def test_a_run_held_out_that_no_model_follows_is_set_aside() -> None:
+    runs = [run_of(decay(a, drag=0.03), str(k), seed=k) for k, a in enumerate((1.5, 0.9, 1.3))]
+    drifting = dataclasses.replace(runs[1], theta=runs[1].theta + 0.05 * TIME, hold_out=True)
+    data, _, _ = baseline.fit_followed(split_records(experiment(runs[0], drifting, runs[2])))
+    assert {data.runs[k].name for k in (*data.fitted_of, *data.held_of)} == {"0", "2"}
+    assert data.inside
+    assert [run.name for run in data.runs if run.findings] == ["1"]
+
+
+def test_no_other_start_is_tried_where_noise_explains_the_residuals(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    starts, fit = [], baseline.fit_with_candidates
+
+    def counted(*given: Any, short: bool, **more: Any) -> Any:  # noqa: ANN401 (passed on)
+        starts.append(short)
+        return fit(*given, short=short, **more)
+
+    monkeypatch.setattr(baseline, "fit_with_candidates", counted)
+    theta, wave = decay(1.5, drag=0.03), 0.01 * np.sin(TIME)
+    for more, asked in ((0.0, [False]), (wave, [False, True])):
+        starts.clear()
+        fit_baseline(split_records(experiment(run_of(theta + more))))
+        assert starts == asked

@@ -7,6 +7,7 @@ import functools
 import importlib
 import math
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -166,6 +167,48 @@ def test_what_is_left_within_a_few_percent_of_the_noise_is_no_gap(
     assert judged(state, best).verdict == "partial"
     monkeypatch.setattr("pendmap.diagnosis.verdict.SLIGHT", 5.0)
     assert judged(state, best).verdict in {"named", "ambiguous"}
+
+
+@pytest.mark.parametrize(("scale", "reserve"), [(1.0, False), (1.0009, True)])
+def test_a_slight_gap_that_one_effect_would_close_gives_a_reserve(
+    scale: float, *, reserve: bool
+) -> None:
+    clean, run = decay(2.2, 0 * NOISE), decay(2.2)
+    result = diagnose(dataclasses.replace(run, theta=scale * clean.theta + NOISE), max_effects=1)
+    assert result.verdict == "named"
+    assert (result.assessment.form.chances["effects"] < CHANCE) is reserve
+    assert [effect.approximate for effect in result.effects] == [reserve]
+
+
+def test_a_model_is_evaluated_on_held_out_records_without_further_fits(
+    dragged: tuple[State, FittedModel, FittedModel], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    state, _, best = dragged
+    again = State(state.data, state.base, Thresholds(), 3, ())
+    monkeypatch.delattr("pendmap.diagnosis.state.hold_out_losses")
+    assert again.scored(best).hold_out.degrees > 0
+
+
+def test_half_of_the_gap_is_that_of_all_records_together() -> None:
+    def judge(fitted: float, held: float) -> bool:
+        def model(rms: float, other: float) -> Any:  # noqa: ANN401 (a stub)
+            fit, out = (SimpleNamespace(samples=n, rms=x) for n, x in ((800, rms), (200, other)))
+            return SimpleNamespace(fit=fit, out=SimpleNamespace(fit=out))
+
+        held_back = (SimpleNamespace(sigmas=np.zeros(1), counted=np.ones(1, bool), count=None),)
+        state: Any = SimpleNamespace(
+            hold_out=lambda m: m.out,
+            noise=0.0,
+            records=SimpleNamespace(held=held_back),
+            thresholds=Thresholds(),
+        )
+        less, full = model(1.0, 1.0), model(math.sqrt(1 - fitted), math.sqrt(1 - held))
+        return State._halves_gap(state, less, full)  # noqa: SLF001 (the rule)
+
+    assert judge(0.51, 0.51)
+    assert judge(0.6, 0.4)
+    assert not judge(0.6, 0.3)
+    assert not judge(0.5, 0.4)
 
 
 @pytest.mark.parametrize(

@@ -70,6 +70,8 @@ def bad(theta: Floats) -> Floats:
 
 
 DRIVEN, CAUGHT = steady(6.0, 0.0), steady(5.6, 3.0)
+TAKEN = FINE[0][::10], FINE[1][::10].copy()
+TAKEN[1][800:] = 0.4 + (TAKEN[1][800] - 0.4) * np.exp(-8 * (TAKEN[0][800:] - TAKEN[0][800]))
 TICK = np.floor((np.arange(1000) * 0.02 + 0.0037) / 0.015625) * 0.015625
 
 
@@ -99,6 +101,23 @@ KINDS = [
         "tracker_angle.txt",
         "mass A\t\t\nt\tθ\tr\n" + rows("{:.3f}\t{:.2f}\t0.4001", TIME, DEGREES),
         finding="angle-unit",
+    ),
+    Kind(
+        "kinovea.txt",
+        "#Kinovea Trajectory data export\n#T X Y\n"
+        + rows(
+            "0:00:{:02.0f}:{:02.0f} {:.2f} {:.2f}",
+            *np.divmod(np.round(100 * TIME), 100),
+            100 * X,
+            100 * Y,
+        ),
+        finding="angle-from-pixels",
+    ),
+    Kind(
+        "space.csv",
+        "Frame,Time,Bob X,Bob Y,Bob Z\n"
+        + rows("{},{:.3f},0.0500,{:.4f},{:.4f}", range(TIME.size), TIME, X, Y),
+        finding="angle-from-pixels",
     ),
     Kind(
         "logger_pro.csv",
@@ -157,6 +176,11 @@ KINDS = [
         "t_ms,counts\n" + rows("{:.0f},{:.0f}", 1e3 * TIME, THETA * 2400 / math.tau),
         {"counts_per_turn": 2400},
     ),
+    Kind(
+        "encoder_bare.csv",
+        "t_ms,enc\n" + rows("{:.0f},{:.0f}", 1e3 * TIME, THETA * 2400 / math.tau),
+        {"angle_unit": "counts", "counts_per_turn": 2400},
+    ),
     Kind("midnight.csv", "Time,Angle (deg)\n" + stamped("%H:%M:%S.%f|,")),
     Kind("twelve_hours.csv", "Time;Angle (deg)\n" + stamped("%I:%M:%S.%f| %p;")),
     Kind(
@@ -198,6 +222,12 @@ KINDS = [
         right=DRIVEN,
     ),
     Kind(
+        "taken.csv",
+        "t_s,theta_rad\n" + rows("{:.2f},{:.4f}", *TAKEN),
+        finding="handled-end",
+        right=TAKEN,
+    ),
+    Kind(
         "caught.csv",
         "t_s,theta_rad\n" + rows("{:.2f},{:.4f}", *CAUGHT),
         {"from_s": 5.6, "to_s": 25},
@@ -208,6 +238,12 @@ KINDS = [
         "bad_reading.csv",
         "t_s,theta_rad\n" + rows("{:.2f},{:.4f}", TIME, bad(THETA)),
         finding="outliers",
+    ),
+    Kind(
+        "lost.csv",
+        "t_s,theta_rad\n"
+        + re.sub(r"(?m)(?<=4,).*$", "-999", rows("{:.2f},{:.4f}", TIME, THETA), count=9),
+        finding="angle-missing",
     ),
     Kind(
         "frames.csv",

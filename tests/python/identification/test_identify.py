@@ -254,12 +254,23 @@ def test_what_is_unphysical_is_held_at_0(report: IdentificationReport) -> None:
         assert entry["stderr"][name] is None
         low, high = entry["ci95"][name]
         assert low == 0 < high
-        assert f" = 0 (below {high:.2g})" in next(iter(in_short(result)))
+        assert any(f" = 0 (below {high:.2g})" in line for line in in_short(result))
         text = f"{name} is {free.value:.3g}, which is unphysical: an effect is missing"
         assert any(line.startswith(text) and "held at 0" in line for line in result.warnings)
     # The others are fitted again: the model is the one whose residual is told.
     (one,) = compare(result.model, growing).runs
     assert one.rms == pytest.approx(result.joint.fit.rms, rel=1e-3)
+
+
+def test_a_model_that_does_not_fit_is_said_first_and_once(report: IdentificationReport) -> None:
+    bent = [dataclasses.replace(run, theta=run.theta + 0.02 * run.theta**3) for run in report.runs]
+    result = identify(bent, methods=["trajectory"])
+    (text,), lines = as_json(result)["doubts"], list(in_short(result))
+    assert text.startswith("the model does not fit: residuals are ")
+    assert lines[0] == f"Warning: {text}"
+    for texts in (lines, as_text(result), result.warnings):
+        assert sum("does not fit" in line for line in texts) == 1
+    assert not any("does not fit" in line for line in as_json(report)["doubts"])
 
 
 def test_which_method_gives_the_model() -> None:

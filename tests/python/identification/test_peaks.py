@@ -15,9 +15,9 @@ from fits import TRUTH, agrees, methods_of, run_of, scores, written
 from pendmap import Rig, read_experiment
 from pendmap.comparison import compare
 from pendmap.identification import METHODS, Estimate, Identification, Peaks, find_peaks, table1
-from pendmap.identification.methods import combined, lines, repaired
+from pendmap.identification.methods import combined, lines
 from pendmap.identification.methods.registry import identify_peaks
-from pendmap.identification.period import frequency, mean_period
+from pendmap.identification.peaks import frequency, mean_period
 from pendmap.identification.readings import reading_of
 from pendmap.records.noise import noise_of
 
@@ -348,7 +348,7 @@ def test_a_short_record_gives_the_numbers_of_peaks_found_and_needed(count: int) 
     small = math.radians(11.0) * 0.9 ** np.arange(count)
     size = np.concatenate(([1.4, 0.4], small)) * (-1.0) ** np.arange(count + 2)
     made = Peaks.of(np.arange(count + 2) * 0.5, size)
-    needed = {combined.from_peaks: 4, repaired.from_peaks: 6, lines.log_decrement: 3}
+    needed = {combined.from_peaks: 4, combined.repaired: 6, lines.log_decrement: 3}
     for method, least in needed.items():
         result = method(made)
         assert not result.applicable

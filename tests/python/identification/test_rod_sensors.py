@@ -1,22 +1,20 @@
-"""Damping from a gyroscope or an accelerometer alone, against decays integrated with scipy."""
+"""Damping from a gyroscope alone, against decays integrated with scipy."""
 
 from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 import pendmap
-from accelerations import GRAVITY, experiment, readings
 from decays import decay, record
 from fits import TRUTH, agrees, methods_of, written
-from pendmap import InputError, render
+from pendmap import render
 from pendmap.comparison import compare
-from pendmap.comparison.data import split_records
 from pendmap.identification import identified_model, identify
 from pendmap.identification.methods.trajectory import fit_trusted
 from pendmap.identification.report import as_text
@@ -26,7 +24,6 @@ if TYPE_CHECKING:
     from decays import Floats
     from pendmap.identification import Identification
 
-TANGENTIAL = '{ name = "acc", unit = "m/s2", direction = "tangential", distance_m = %g }'
 GYRO = "Gyroscope z (rad/s)"
 DEGREE = math.pi / 180
 
@@ -52,12 +49,6 @@ def rates(  # noqa: PLR0913 (the release and the sensor)
 def read(folder: Path, *columns: Floats, names: str = GYRO) -> Run:
     path = written(folder / "run.csv", *columns, names=names, form="%.8g")
     return pendmap.read_experiment(path).runs[0]
-
-
-def accelerated(
-    folder: Path, *columns: Floats, column: str = TANGENTIAL % 0.1, more: str = ""
-) -> Run:
-    return pendmap.read_experiment(experiment(folder, column, *columns, more=more)).runs[0]
 
 
 def fit_model(*runs: Run, effects: tuple[str, ...] = ()) -> Identification:
@@ -99,71 +90,27 @@ def test_a_gyroscope_gives_the_truth(tmp_path: Path, case: str) -> None:
     assert units["w0"] == units["bias"] == best.unit("bias[0]") == "rad/s"
 
 
-ANGULAR = '{ name = "acc", unit = "%s" }'
-AROUND = {"direction": "angular", "noise": 0.2, "release": 2.0}
-# Column, what is read, unit; sensors on both sides of the centre of oscillation, 0.255 m
-ACCELEROMETERS: dict[str, tuple[str, dict[str, Any], float]] = {
-    "small": (TANGENTIAL % 0.5, {"release": 0.3, "distance": 0.5}, 1.0),
-    "near": (TANGENTIAL % 0.1, {"bias": 0.05, "tilt": 0.02}, 1.0),
-    "far": (TANGENTIAL % 0.5, {"release": 2.2, "distance": 0.5, "bias": 0.05, "tilt": 0.02}, 1.0),
-    "wide": (TANGENTIAL % 0.1, {"release": 2.9, "bias": 0.05, "tilt": 0.02}, 1.0),
-    "no gravity": (
-        (TANGENTIAL % 0.25).replace("}", ", gravity_removed = true }"),
-        {"distance": 0.25, "gravity": 0.0},
-        1.0,
-    ),
-    # The reading jumps at each turn by 2 r Tr = 0.5 m/s^2, 25 times the noise.
-    "strong friction": (TANGENTIAL % 0.5, {"distance": 0.5, "friction": 0.5, "seconds": 20}, 1.0),
-    "g": ((TANGENTIAL % 0.1).replace("m/s2", "g"), {"gravity": 9.79}, 9.80665),
-    "angular": (ANGULAR % "rad/s2", AROUND, 1.0),
-    "angular degrees": (ANGULAR % "deg/s2", AROUND, DEGREE),
-}
-
-
-@pytest.mark.parametrize("case", ACCELEROMETERS)
-def test_an_accelerometer_gives_the_truth(tmp_path: Path, case: str) -> None:
-    column, given, unit = ACCELEROMETERS[case]
-    time, _, force = readings(**given)
-    rig = f"[rig]\ngravity = {given.get('gravity') or GRAVITY}\n"
-    best = fit_model(accelerated(tmp_path, time, force / unit, column=column, more=rig))
-    further = {name: given[name] for name in ("bias", "tilt") if name in given}
-    agrees(best, TRUTH | {"Tr": given.get("friction", 0.08)} | further, 3.5)
-    assert not any("does not fit" in warning for warning in best.warnings), best.warnings
-    assert ("tilt" in best.estimates) == ("angular" not in case)
-
-
 def test_errors_are_what_the_information_allows(tmp_path: Path) -> None:
     """For small swings an angle with the noise over the gain gives the same information."""
-    time, _, force = readings(release=0.5, seconds=30)
-    gain = GRAVITY - 0.1 * TRUTH["w0"] ** 2
-    for run, sigma, bound in (
-        (read(tmp_path, *rates(release=0.5)), 5e-3 / TRUTH["w0"], 1.25),
-        (accelerated(tmp_path / "a", time, -force), 0.02 / gain, 2.0),
-    ):
-        angle = record(decay(release=0.5), seconds=30, noise_deg=math.degrees(sigma), seed=1)
-        one, other = fit_model(run), methods_of(*angle, "trajectory")["trajectory"]
-        agrees(one, TRUTH)
-        for name in TRUTH:
-            errors = [result.estimates[name].stderr or math.nan for result in (one, other)]
-            assert 1 / bound < errors[0] / errors[1] < bound, name
+    sigma = 5e-3 / TRUTH["w0"]
+    angle = record(decay(release=0.5), seconds=30, noise_deg=math.degrees(sigma), seed=1)
+    one, other = fit_model(read(tmp_path, *rates(release=0.5))), methods_of(*angle, "trajectory")
+    agrees(one, TRUTH)
+    for name in TRUTH:
+        errors = [fit.estimates[name].stderr or math.nan for fit in (one, other["trajectory"])]
+        assert 1 / 1.25 < errors[0] / errors[1] < 1.25, name
 
 
-@pytest.mark.parametrize(("sensor", "least"), [("gyroscope", 52), ("accelerometer", 48)])
-def test_intervals_hold_the_truth(tmp_path: Path, sensor: str, least: int) -> None:
+def test_intervals_hold_the_truth(tmp_path: Path) -> None:
     """Of 60 intervals of 95 % from twenty short decays 57 +- 1.7 contain the true value."""
     inside = 0
     for seed in range(20):
-        given: Any = {"release": 0.6, "seconds": 12, "seed": seed, "bias": 0.03, "rate": 50}
-        if sensor == "gyroscope":
-            run = read(tmp_path, *rates(**given))
-        else:
-            time, _, force = readings(**given)
-            run = accelerated(tmp_path, time, force)
+        run = read(tmp_path, *rates(release=0.6, seconds=12, seed=seed, bias=0.03, rate=50))
         best = fit_model(run)
         for name, true in TRUTH.items():
             low, high = best.estimates[name].ci95 or (math.nan, math.nan)
             inside += low <= true <= high
-    assert least <= inside <= 60
+    assert 52 <= inside <= 60
 
 
 def test_a_gain_is_fitted_on_demand(tmp_path: Path) -> None:
@@ -215,28 +162,20 @@ def test_a_gyroscope_in_a_forced_run(tmp_path: Path) -> None:
 
 
 def test_sensors_and_angles_are_fitted_together(tmp_path: Path) -> None:
-    """Each run has its own sensor parameters: a zero of the angle, bias and tilt otherwise."""
+    """Each run has its own sensor parameters: a zero of the angle or a bias."""
     time, angle = record(decay(release=1.0), seconds=30.0, offset=0.01)
     _, rate = rates(release=1.0)
     both = read(tmp_path, time, angle, rate, names="theta_rad,gyro_z (rad/s)")
     assert both.gyroscope is None  # an angle is preferred
     agrees(fit_model(read(tmp_path, *rates()), both), TRUTH | {"offset": 0.01, "bias[0]": 0.01})
-    times, _, force = readings(bias=0.05)
-    agrees(fit_model(accelerated(tmp_path / "a", times, force), both), {**TRUTH, "bias[0]": 0.05})
 
 
-@pytest.mark.parametrize("sensor", ["gyroscope", "accelerometer"])
-def test_reports_and_comparisons_are_in_radians(tmp_path: Path, sensor: str) -> None:
+def test_reports_and_comparisons_are_in_radians(tmp_path: Path) -> None:
     """The rms residual is the noise over the gain; a model of another w0 has a larger one."""
-    time, _, force = readings()
-    if sensor == "gyroscope":
-        run, level = read(tmp_path, *rates(release=1.0, seconds=40)), 5e-3 / TRUTH["w0"]
-    else:
-        run = accelerated(tmp_path / "a", time, force)
-        level = 0.02 / (GRAVITY - 0.1 * TRUTH["w0"] ** 2)
+    run, level = read(tmp_path, *rates(release=1.0, seconds=40)), 5e-3 / TRUTH["w0"]
     report = identify(run)
     assert any("bias = " in line for line in as_text(report))
-    assert not {"bias", "tilt"} & set(identified_model(report).notes["covariance"]["names"])
+    assert "bias" not in identified_model(report).notes["covariance"]["names"]
     # The other methods read the computed angle, and are less accurate.
     for name in ("energy_balance", "combined_repaired"):
         assert report.methods[name]["w0"] == pytest.approx(TRUTH["w0"], rel=0.01)
@@ -244,6 +183,3 @@ def test_reports_and_comparisons_are_in_radians(tmp_path: Path, sensor: str) -> 
     for w0, low, high in ((6.2, 0.95, 1.05), (6.21, 3.0, math.inf)):
         other = pendmap.Rig(**TRUTH | {"w0": w0})
         assert low * level < compare(other, run).runs[0].rms < high * level
-    if sensor == "accelerometer":
-        with pytest.raises(InputError, match="its angle is computed from an acceler"):
-            split_records(Experiment(tmp_path, (run,)))

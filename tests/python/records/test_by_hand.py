@@ -137,6 +137,7 @@ def test_an_invalid_value_is_refused_in_one_line(
         (text((0 * TIME, THETA), ""), {}),
         (text((np.arange(TIME.size), THETA), "tick,theta_rad"), {}),  # a counter is no clock
         (text((TIME, 0.1 * RATE, 0.2 * RATE, RATE), "t_s,z,y,x"), {}),  # axes are no places
+        (text((TIME, 9.81 * THETA, OTHER), "t_s,acc x (m/s2),acc y (m/s2)"), {}),  # no angle
         (text((TIME, 1e6 * THETA), "t_s,theta_rad"), {}),
         (text((0 * TIME, THETA), "t_s,theta_rad"), {}),
         (text((OTHER, THETA), "t_s,theta_rad"), {}),

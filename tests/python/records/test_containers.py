@@ -66,7 +66,7 @@ def test_a_table_in_another_file_is_read(tmp_path: Path, write: Callable[[Path],
 def test_what_has_no_table_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, write: Callable[[Path], Path], says: str
 ) -> None:
-    monkeypatch.setattr("pendmap.tables.workbooks.MOST_CELLS", 100_000)
+    monkeypatch.setattr("pendmap.tables.programs.MOST_CELLS", 100_000)
     monkeypatch.setattr(formats, "MOST_BYTES", 1_000_000)
     monkeypatch.setattr("pendmap.tables.table.MOST_BYTES", 1_000_000)
     with pytest.raises(pendmap.InputError, match=says):

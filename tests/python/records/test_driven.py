@@ -79,6 +79,36 @@ def test_a_push_divides_a_decay(factor: float) -> None:
     assert push <= after.time[after.trusted][0] < push + PERIOD
 
 
+CATCH = 31.3
+HANDS = {
+    "held": lambda theta, after: theta[0] * np.exp(-after / 0.2) + 0.2 * (1 - np.exp(-after)),
+    "turned back": lambda theta, after: theta[0] + 0.4 * (1 - np.exp(-3 * after)),
+    "moved": lambda theta, after: theta[0] * np.exp(-after) + 0.3 * np.sin(1.7 * after),
+}
+
+
+@pytest.mark.parametrize("way", HANDS)
+@pytest.mark.parametrize("until", [33.0, 40.0])
+def test_a_hand_ends_a_decay(way: str, until: float) -> None:
+    theta, late = swinging(decay(0.02)), TIME >= CATCH
+    theta[late] = noisy(HANDS[way](theta[late], TIME[late] - CATCH), 0.002)
+    frame = pd.DataFrame({"t_s": TIME, "theta_rad": theta})[until > TIME]
+    run = pendmap.read_experiment(frame).runs[0]
+    assert CATCH - PERIOD < run.time[run.trusted][-1] <= CATCH
+    assert run.segments[1].what in {"handled", "held"}
+
+
+@pytest.mark.parametrize("lift", [0.02, 0.5])
+def test_a_hold_by_a_trembling_hand_is_no_motion(lift: float) -> None:
+    theta, release = np.roll(swinging(decay()), 70), TIME[70]
+    early = release > TIME
+    theta[early] = noisy(0.8 + 0.01 * np.sin(9 * TIME[early]), 0.002)
+    theta[early] *= np.clip((TIME[early] + 0.02) / lift, 0, 1)
+    (run,) = read(theta)
+    assert release <= run.time[run.trusted][0] < release + 0.5 * PERIOD
+    assert "held-start" in found(run)
+
+
 FREE = {
     "light": decay(2e-4),
     "viscous": decay(0.1),

@@ -263,7 +263,7 @@ def test_a_workbook_without_its_reader_is_refused_in_one_line(
 def test_a_small_workbook_does_not_unpack_to_gigabytes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, sheet: str, says: str
 ) -> None:
-    monkeypatch.setattr("pendmap.tables.workbooks.MOST_CELLS", 1_200_000)
+    monkeypatch.setattr("pendmap.tables.programs.MOST_CELLS", 1_200_000)
     monkeypatch.setattr("pendmap.tables.table.MOST_BYTES", 1_000_000)
     plain, path = workbook(tmp_path, {"data": [[1.0]]}), tmp_path / "bomb.xlsx"
     with zipfile.ZipFile(plain) as packed, zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as bomb:

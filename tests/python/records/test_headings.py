@@ -48,6 +48,9 @@ Time;Motor angle (deg);Pendulum angle (deg) | s drive deg
 Time;Angle 1;Angle 2 | s drive rad
 time;theta_std;theta_mean | s error rad
 sample;time;angle (Â°) | count s deg
+step;frame;t;θ | count count s rad
+Frame;Time;bob X;bob Y;bob Z | count s noise x y
+Time (s);X (mm);Y (mm);Z (mm) | s x noise y
 time;x position (mm);y position (mm) | s x y
 time;gyro_x_dps;gyro_y_dps | s noise deg/s
 Zeit [ms];Winkel [Grad] | ms deg
@@ -125,6 +128,17 @@ def test_what_is_no_angle_is_refused_with_a_command(
     with pytest.raises(pendmap.InputError, match=re.escape(says)) as error:
         read(tmp_path, text((TIME, scale * THETA), names))
     assert f"pendmap look {tmp_path / 'record.csv'} {way}" in str(error.value)
+
+
+def test_counts_without_a_unit_are_refused_with_a_command(tmp_path: Path) -> None:
+    way = "--angle-unit counts --counts-per-turn 2400"
+    with pytest.raises(pendmap.InputError, match=way):
+        read(tmp_path, text((TIME, np.round(2400 / math.tau * THETA)), "t,enc"))
+
+
+def test_degrees_are_not_converted_twice(tmp_path: Path) -> None:
+    run = read(tmp_path, text((TIME, 300 * THETA), "t,angle_deg"))
+    assert "the unit or the scale is wrong" in found(run)["angle-unit"].text
 
 
 @pytest.mark.parametrize("part", [np.cos(THETA), np.abs(THETA), 0.3 - 0.4 * np.cos(THETA)])

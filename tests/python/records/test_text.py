@@ -62,6 +62,8 @@ FILES: dict[str, tuple[list[str], str]] = {
     "a clock of twelve hours": (["Time,Angle", *lines("{n:%I:%M:%S.%f} PM,{a:.5f}")], "Time Angle"),
     "one without am and pm": (["Time,Angle", *lines("{n:%I:%M:%S.%f},{a:.5f}")], "Time Angle"),
     "minutes and seconds": (["Time,Angle", *lines("{m}:{t:05.2f},{a:.5f}")], "Time Angle"),
+    "hundredths behind the seconds": (["T Angle", *[f"0:00:{k // 25:02d}:{k % 25 * 4:02d} {a:.5f}" for k, a in enumerate(THETA)]], "T Angle"),
+    "frames behind the seconds": (["T Angle", *[f"0:00:{k // 25:02d}:{k % 25:02d} {a:.5f}" for k, a in enumerate(THETA)]], "T Angle"),
     "commas of logging": (["Time,Angle", *[re.sub(r"\.(\d{3})\d+,", r",\1,", line) for line in lines("{d:%H:%M:%S.%f},{a:.5f}")]], "Time Angle"),
     "dates, day first": (["Datum;Winkel", *lines("{d:%d.%m.%Y %H:%M:%S.%f};{a:.5f}")], "Datum Winkel"),
     "dates, month first": (["Date,Angle", *lines("{d:%m/%d/%Y %I:%M:%S.%f %p},{a:.5f}")], "t_s Angle"),
@@ -69,9 +71,11 @@ FILES: dict[str, tuple[list[str], str]] = {
     "dates without marks": (["Time;Angle", *lines("{d:%Y%m%d %H:%M:%S.%f};{a:.5f}")], "Time Angle"),
     "a time beside an empty one": (["t_s,time_ms,theta_rad", *lines(",{us},{a:.5f}")], "time_ms theta_rad"),
     "an arrow": (["", *lines("{d:%H:%M:%S.%f} -> {a:.5f}")], "column 1 column 2"),
+    "brackets": (lines("[{d:%Y-%m-%d %H:%M:%S.%f}] theta: {a:.5f}"), "t_s theta"),
     "date and time apart": (["Date,Time,Angle", *lines("{d:%d/%m/%Y},{d:%H:%M:%S.%f},{a:.5f}")], "Time Angle"),
     "s since 1970": (["clock,theta", *[f"{1738928443 + float(x):.2f},{y}" for x, y in (z.split() for z in lines("{t:.2f} {a:.5f}"))]], "clock theta"),
     "ns since 1970": (["time (ns),theta", *[f"{1738928443 * 10**9 + int(x)},{y}" for x, y in (z.split() for z in lines("{us} {a:.5f}"))]], "time [s] theta"),
+    "s and ns apart": (["stamp.sec,stamp.nanosec,position[0]", *[f"{1738928443 + x // 10**9},{x % 10**9},{y}" for x, y in ((int(z[0]), z[1]) for z in map(str.split, lines("{us} {a:.5f}")))]], "stamp.sec position[0]"),
 }  # fmt: skip
 
 
@@ -83,6 +87,33 @@ def test_a_text_table_is_read(tmp_path: Path, kind: str) -> None:
     np.testing.assert_allclose(run.time - run.time[0], TIME, atol=1e-5)
     np.testing.assert_allclose(run.theta, THETA, atol=1e-5)
     assert ("tables-behind" in found(run)) == (kind == "a spectrum behind")
+
+
+@pytest.mark.parametrize("lost", ["-999", "9999.0", "---", "NaN"])
+def test_lost_readings_are_left_out(tmp_path: Path, lost: str) -> None:
+    cells = [lost if k % 40 == 7 else f"{a:.5f}" for k, a in enumerate(THETA)]
+    content = ["t,theta", *[f"{t:.2f},{cell}" for t, cell in zip(TIME, cells, strict=True)]]
+    run = read(tmp_path, "\n".join(content) + "\n")
+    there = np.arange(TIME.size) % 40 != 7
+    np.testing.assert_allclose(run.theta, THETA[there], atol=1e-5)
+    assert run.trusted.all()
+
+
+@pytest.mark.parametrize(
+    ("above", "rate"),
+    [
+        (["Sampling frequency: 40 Hz", "angle (deg)"], 40),
+        (["zero, sample_rate, length", "0, 40, 5"], 40),
+        (["Abtastintervall;25 ms", "Winkel"], 40),
+        (["Capture Frame Rate\t0.04 kHz", "Total Frames\t300"], 40),
+        (["Sample time: 12:30:05", "drive frequency: 3 Hz", "angle"], 100),
+    ],
+)
+def test_a_rate_above_the_table_is_in_the_command(
+    tmp_path: Path, above: list[str], rate: int
+) -> None:
+    with pytest.raises(pendmap.InputError, match=f"--rate {rate} --angle 1"):
+        read(tmp_path, "\n".join([*above, *lines("{a:.5f}")]) + "\n")
 
 
 @pytest.mark.parametrize(

@@ -44,7 +44,7 @@ compare m.toml lab --members 20 --spread 0.002; compare m.toml unlike
 diagnose bias.csv --max-effects 1 --out b.nc; diagnose wrong --max-effects 0
 diagnose drag.csv --max-effects 1 --without quadratic_drag
 """
-EFFECT, SENSOR = f"({'|'.join(library())})", r"(bias|tilt)(\[\d+\])?"
+EFFECT, SENSOR = f"({'|'.join(library())})", r"bias(\[\d+\])?"
 NAMES = {"EFFECT": EFFECT, "SENSOR": SENSOR, "PARAMETER": r"[\w.]+(\[\d+\])?"}
 
 

@@ -11,7 +11,15 @@ import click
 
 from pendmap.cli.parse.options import MODEL, SI, added, option
 from pendmap.cli.parse.signature import parameters
-from pendmap.cli.parse.types import FILE, NUMBER, NUMBER_OR_RANGE, RANGE, AxisText
+from pendmap.cli.parse.types import (
+    ENDS,
+    FILE,
+    NUMBER,
+    NUMBER_OR_ENDS,
+    NUMBER_OR_RANGE,
+    RANGE,
+    AxisText,
+)
 from pendmap.errors import InputError
 from pendmap.model import PRESETS, Pendulum, Rig, load_model
 from pendmap.model.labels import LABELS
@@ -28,8 +36,11 @@ _SI = ("c_over_m", "Tr", "stroke_mm", "frequency_hz")
 _SAME = {"c_over_m": "gamma", "Tr": "theta_r", "stroke_mm": "p", "frequency_hz": "omega"}
 
 
-def varied_model_options(function: Command) -> Command:
-    """Add the options of the model; ranges among them become ``ranges``, in the order typed."""
+def varied_model_options(function: Command, *, ends: bool = False) -> Command:
+    """Add the options of the model; ranges among them become ``ranges``, in the order typed.
+
+    Ranges are values, or two ``ends`` alone.
+    """
 
     @functools.wraps(function)
     def with_ranges(**given: Any) -> Any:  # noqa: ANN401 (as the command)
@@ -54,16 +65,16 @@ def varied_model_options(function: Command) -> Command:
 
     vary = option(
         "--vary",
-        (str, RANGE),
-        "A parameter that varies, N values from A to B: p, omega, ..., EFFECT.PARAMETER; of a"
-        " model in SI also Omega, c_over_m, Tr, phi, stroke_mm, and frequency_hz, where the stroke"
-        " is constant if the model gives it, else p.",
+        (str, ENDS if ends else RANGE),
+        f"A parameter that varies, {'' if ends else 'N values '}from A to B: p, omega, ...,"
+        " EFFECT.PARAMETER; of a model in SI also Omega, c_over_m, Tr, phi, stroke_mm, and"
+        " frequency_hz, where the stroke is constant if the model gives it, else p.",
         nargs=2,
         multiple=True,
-        metavar="NAME A:B:N",
+        metavar="NAME A:B" if ends else "NAME A:B:N",
         group=MODEL,
     )
-    return model_options(vary(with_ranges), NUMBER_OR_RANGE)
+    return model_options(vary(with_ranges), NUMBER_OR_ENDS if ends else NUMBER_OR_RANGE)
 
 
 def model_options(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import importlib
 import math
@@ -128,6 +129,13 @@ def _values(text: str) -> list[float]:
     return [low + (high - low) * k / max(count - 1, 1) for k in range(count)]
 
 
+def _ends(text: str) -> AxisText:
+    """Read the two ends of a range, in which values are chosen by the computation."""
+    with contextlib.suppress(InputError):
+        return _range(f"{text}:2" if text.count(":") == 1 else "")
+    raise InputError(f"must be A:B, the ends of a range, like 0.5:2, got {text!r}")
+
+
 def _instruction_set(text: str) -> str:
     """Refuse an instruction set that this processor lacks."""
     from pendmap import _core
@@ -230,6 +238,10 @@ AXIS = OptionType("A:B:N", _axis)
 RANGE = OptionType("A:B:N", _range)
 NUMBER_OR_RANGE = OptionType[float | AxisText](
     "number|A:B:N", lambda text: _range(text) if ":" in text else _number(text)
+)
+ENDS = OptionType("A:B", _ends)
+NUMBER_OR_ENDS = OptionType[float | AxisText](
+    "number|A:B", lambda text: _ends(text) if ":" in text else _number(text)
 )
 TEXT = OptionType("text", str)
 COLUMN = OptionType[str | int]("column", lambda text: int(text) if text.isdecimal() else text)

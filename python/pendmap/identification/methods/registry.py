@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendmap.errors import InputError
-from pendmap.identification.methods import combined, energy_balance, lines, repaired
+from pendmap.identification.methods import combined, lines
 from pendmap.identification.methods.base import NEEDS_SAMPLES, Identification, inapplicable
 from pendmap.signal.robust import normal_scale
 
@@ -24,7 +24,7 @@ BEST: Final = "trajectory"  # The default method
 
 _OF_PEAKS: Final[Mapping[str, Callable[[Peaks], Identification]]] = {
     "combined": combined.from_peaks,
-    "combined_repaired": repaired.from_peaks,
+    "combined_repaired": combined.repaired,
     "log_decrement": lines.log_decrement,
     "de_paula": lines.de_paula,
 }
@@ -54,7 +54,7 @@ def apply_method(
     if peaks.lacking:
         result = inapplicable(peaks.lacking)
     elif name == "energy_balance" and record is not None:
-        result = energy_balance.from_peaks(peaks, record)
+        result = lines.energy_balance(peaks, record)
     else:
         result = _OF_PEAKS[name](peaks) if name in _OF_PEAKS else inapplicable(NEEDS_SAMPLES)
     return dataclasses.replace(result, method=name)

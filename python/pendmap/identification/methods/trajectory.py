@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from pendmap.records import Run
 
 DRAG: Final = "quadratic_drag"  # Effect tried where viscous damping and friction do not fit
+UNFIT: Final = "the model does not fit"  # First words of the warning of it
 NEAR_UPRIGHT: Final = 0.3  # Angle from upright, rad, within which no fit may follow a run
 MOST_LEFT: Final = 0.5  # Least share of a run that is fitted from where it leaves upright
 LACKING: Final = 4.0  # Widening above which weights are equal: else the slowest would dominate
@@ -95,14 +96,13 @@ def _warnings(joint: JointFit, estimates: Mapping[str, Estimate]) -> list[str]:
             warnings.append(f"{name} is {e.value:.3g}, which is unphysical: {why}")
     if fit.widening > 1:
         warnings.append(
-            f"the model does not fit: residuals are {fit.rms / joint.noise:.3g} times the noise; "
-            f"errors are {math.sqrt(fit.widening):.2g} times as wide; an effect is missing in the "
-            "model"
+            f"{UNFIT}: residuals are {fit.rms / joint.noise:.3g} times the noise; errors are "
+            f"{math.sqrt(fit.widening):.2g} times as wide; an effect is missing in the model"
         )
     if not fit.converged:
         warnings.append("the search did not converge")
-    # A sensor's tilt is determined by large swings only: its interval is not reported.
-    wanted = {name: e for name, e in estimates.items() if name.partition("[")[0] not in SENSOR}
+    # The interval of a sensor's bias is not reported.
+    wanted = {name: e for name, e in estimates.items() if name.partition("[")[0] != SENSOR}
     lost = [name for name, e in wanted.items() if e.ci95 is None and name not in joint.negative]
     if lost:
         warnings.append(f"no finite interval was found for {', '.join(lost)}")
@@ -240,7 +240,7 @@ def _from_upright(run: Run) -> Run:
     after = np.arange(run.time.size) > np.max(np.flatnonzero(near), initial=-1)
     left = np.count_nonzero(run.trusted & after)
     if (
-        run.rod_sensor is not None
+        run.gyroscope is not None
         or not np.count_nonzero(run.trusted) > left > MOST_LEFT * after.size
     ):
         return run
