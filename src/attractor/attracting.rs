@@ -8,8 +8,9 @@ use crate::integrate::{State, Strobe};
 use crate::orbit::PoincareMap;
 use crate::orbit::newton::{self, PeriodicOrbit};
 
-/// A state at the edge of those that friction holds creeps: a multiplier is this close to 1.
-const CREEPING: f64 = 1e-7;
+/// Under friction a multiplier this close to 1 shows no attraction: a state at the edge of those that are held creeps, and a
+/// turn in one sense, to which friction is a constant torque, shrinks by the error of the steps alone.
+const NEUTRAL: f64 = 1e-5;
 
 /// Points of similar orbits of similar pendulums, the most similar first, and their period.
 pub type Alike = (Vec<State>, usize);
@@ -38,11 +39,11 @@ pub fn attracting(
     found
 }
 
-/// Whether an orbit is stable, and none of its points one that friction holds for ever, or on the edge of these.
+/// Whether an orbit is stable, under friction by more than [`NEUTRAL`] and at no state that is held for ever.
 fn attracts(strobe: &Strobe, orbit: &PeriodicOrbit) -> bool {
     let held = |p: &State| p[1] == 0.0 && strobe.equation.holds_for_ever(p[0]);
-    let creeps = || orbit.multipliers.largest() > 1.0 - CREEPING || orbit.points.iter().any(held);
-    orbit.is_stable() && !(strobe.friction && creeps())
+    let stays = || orbit.multipliers.largest() > 1.0 - NEUTRAL || orbit.points.iter().any(held);
+    orbit.is_stable() && !(strobe.friction && stays())
 }
 
 impl Catalogue {
