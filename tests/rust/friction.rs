@@ -102,10 +102,16 @@ fn creeping_at_the_edge_counts_as_rest() {
 
 #[test]
 fn what_friction_does_not_shrink_attracts_nothing() {
-    // A turn in one sense, to which it is a constant torque.
-    let strobe = Strobe::new(&rubbing(0.0, 1.0, 2.0, 0.1), 60, simd());
-    let (map, point) = (PoincareMap::of_steps(&strobe), [0.271_561, -2.685_365]);
-    assert!(attracting(&strobe, &map, &[(vec![point], 1)])[0].is_none());
+    // States at the edge of those that it holds; a turn in one sense, to which it is a constant torque.
+    let edge = (0.05_f64 / 3.1).asin();
+    let states = (-5..=5).map(|k| [edge + f64::from(k) * 1e-9, 0.0]);
+    let creeping = states.map(|state| (rubbing(0.1, 2.1, 0.9, 0.05), state));
+    let turning = (rubbing(0.0, 1.0, 2.0, 0.1), [0.271_561, -2.685_365]);
+    for (pendulum, point) in creeping.chain([turning]) {
+        let strobe = Strobe::new(&pendulum, 60, simd());
+        let map = PoincareMap::of_steps(&strobe);
+        assert!(attracting(&strobe, &map, &[(vec![point], 1)])[0].is_none(), "{point:?}");
+    }
 }
 
 #[test]
