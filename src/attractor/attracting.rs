@@ -6,7 +6,11 @@ use super::find::{Catalogue, REACH};
 use crate::error::Error;
 use crate::integrate::{State, Strobe};
 use crate::orbit::PoincareMap;
-use crate::orbit::newton::{self, PeriodicOrbit};
+use crate::orbit::newton::{self, PeriodicOrbit, SAME};
+
+/// Under friction a multiplier this close to 1 shows no attraction: to a turn in one sense it is a constant torque, and what
+/// shrinks is the error of the steps.
+const NEUTRAL: f64 = 1e-5;
 
 /// Points of similar orbits of similar pendulums, the most similar first, and their period.
 pub type Alike = (Vec<State>, usize);
@@ -35,10 +39,15 @@ pub fn attracting(
     found
 }
 
-/// Whether an orbit is stable, and none of its points one that friction holds for ever.
+/// Whether an orbit is stable, under friction by more than [`NEUTRAL`] and at no state that is held for ever, nor at the edge
+/// of these, where all creeps.
 fn attracts(strobe: &Strobe, orbit: &PeriodicOrbit) -> bool {
-    let held = |p: &State| p[1] == 0.0 && strobe.equation.holds_for_ever(p[0]);
-    orbit.is_stable() && !(strobe.friction && orbit.points.iter().any(held))
+    let beside = |theta: f64| [-SAME, 0.0, SAME].map(|d| theta + d);
+    let held = |p: &State| {
+        p[1].abs() < SAME && beside(p[0]).iter().any(|theta| strobe.equation.holds_for_ever(*theta))
+    };
+    let stays = || orbit.multipliers.largest() > 1.0 - NEUTRAL || orbit.points.iter().any(held);
+    orbit.is_stable() && !(strobe.friction && stays())
 }
 
 impl Catalogue {

@@ -6,6 +6,7 @@ use super::capture::{self, Fate};
 use super::chaos::{self, ChaoticSet, spread};
 use super::find::{Catalogue, Ending, open};
 use super::kind::Kind;
+use super::near_returns::tracks;
 use crate::error::Error;
 use crate::integrate::{State, Strobe};
 
@@ -62,7 +63,8 @@ impl Catalogue {
         if runs.iter().all(|run| run.fate != Fate::Open) {
             return Ok(());
         }
-        if self.find_cycles(strobe, &self.effort.map(strobe), &open(endings), cancel)? {
+        let tracks = tracks(strobe, &open(endings), self.effort.longest_cycle);
+        if self.find_cycles(strobe, &self.effort.map(strobe), &tracks, cancel)? {
             // They have settled by now.
             return self.observe(strobe, endings, bound, cancel);
         }

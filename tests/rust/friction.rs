@@ -3,6 +3,7 @@
 use std::f64::consts::{PI, TAU};
 use std::sync::atomic::AtomicBool;
 
+use pendmap::attractor::attracting::attracting;
 use pendmap::integrate::accuracy::distance;
 use pendmap::integrate::reference::flow::Flow;
 use pendmap::integrate::trajectory::{Request, simulate};
@@ -10,6 +11,7 @@ use pendmap::integrate::{State, States, Strobe};
 use pendmap::maps::basins::{BasinMap, Options, basins};
 use pendmap::maps::control::Control;
 use pendmap::model::Pendulum;
+use pendmap::orbit::PoincareMap;
 
 use crate::support::{
     advanced, basins_on_plane, driven, instruction_sets, plane, simd, spread, unchecked,
@@ -96,6 +98,20 @@ fn creeping_at_the_edge_counts_as_rest() {
     assert!(map.share(0) < 1e-9);
     let rest = names.iter().position(|n| *n == "rest").expect("there");
     assert!(map.attractors[rest].multipliers.is_empty());
+}
+
+#[test]
+fn what_friction_does_not_shrink_attracts_nothing() {
+    // States at the edge of those that it holds; a turn in one sense, to which it is a constant torque.
+    let edge = (0.05_f64 / 3.1).asin();
+    let states = (-5..=5).map(|k| [edge + f64::from(k) * 1e-9, 0.0]);
+    let creeping = states.map(|state| (rubbing(0.1, 2.1, 0.9, 0.05), state));
+    let turning = (rubbing(0.0, 1.0, 2.0, 0.1), [0.271_561, -2.685_365]);
+    for (pendulum, point) in creeping.chain([turning]) {
+        let strobe = Strobe::new(&pendulum, 60, simd());
+        let map = PoincareMap::of_steps(&strobe);
+        assert!(attracting(&strobe, &map, &[(vec![point], 1)])[0].is_none(), "{point:?}");
+    }
 }
 
 #[test]
