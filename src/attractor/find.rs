@@ -10,7 +10,7 @@ use super::capture::{self, Fate, Traps};
 use super::catalogue::{Attractor, arrange};
 use super::chaos::{ChaoticSet, KnownChaos};
 use super::effort::Effort;
-use super::near_returns::{escape_speed, near_returns, tracks};
+use super::near_returns::{escape_speed, near_returns};
 use super::rest;
 use super::trap::{self, Band, Ellipse, ellipses};
 use crate::error::{Error, unless_cancelled};
@@ -24,9 +24,6 @@ use crate::progress::Progress;
 
 /// Largest distance of Newton's method from the trajectory's state.
 pub(super) const REACH: f64 = 0.3;
-/// Gap of a return times the norm of its derivative above which a brisk search takes it for a chance return of chaos:
-/// over such lengths the motion is not linear, and Newton's method is lost. A motion that has settled has small gaps.
-const LOST: f64 = 10.0;
 /// Periods between two reports of progress.
 const STRETCH: u32 = 4096;
 /// Most starts settle within this part of a search's bound: in which damping shrinks a free motion by `exp(-10)`.
@@ -224,16 +221,7 @@ impl Catalogue {
             elapsed += length;
             round *= 2;
             let free = open(endings);
-            let tracks = tracks(strobe, &free, self.effort.longest_cycle);
-            let found = self.find_cycles(strobe, &map, &tracks, cancel)?;
-            if !self.effort.precise {
-                // The periods in which they were seen to return, or not, count.
-                let ends = tracks.iter().filter_map(|track| track.last());
-                let free = endings.iter_mut().filter(|e| matches!(e, Ending::Open(_)));
-                free.zip(ends).for_each(|(ending, end)| *ending = Ending::Open(*end));
-                elapsed += self.effort.longest_cycle as u32;
-            }
-            if found {
+            if self.find_cycles(strobe, &map, &free, cancel)? {
                 // Trajectories within the new traps are captured at once.
                 self.run(strobe, endings, self.effort.first_round, elapsed, bound, cancel)?;
             }
@@ -243,7 +231,7 @@ impl Catalogue {
     }
 
     /// Advances the open ones of `endings` by `length` periods, after `elapsed` of `bound`.
-    pub(super) fn run(
+    fn run(
         &mut self,
         strobe: &Strobe,
         endings: &mut [Ending],
@@ -294,23 +282,17 @@ impl Catalogue {
         &mut self,
         strobe: &Strobe,
         map: &PoincareMap,
-        tracks: &[Vec<State>],
+        alive: &[State],
         cancel: &AtomicBool,
     ) -> Result<bool, Error> {
-        let mut returns = near_returns(strobe, tracks, &self.effort);
+        let mut returns = near_returns(strobe, alive, self.effort.longest_cycle);
         let steps = PoincareMap::of_steps(strobe);
         let known = self.orbits.len();
         let mut found: Vec<Ellipse> = Vec::new();
         while !returns.is_empty() {
             unless_cancelled(cancel)?;
             let rest = returns.split_off(returns.len().min(self.effort.tries));
-            let mut tried: Vec<_> = returns.iter().map(|(_, start, n)| (*start, *n)).collect();
-            if !self.effort.precise {
-                let images = steps.iterate_all(&tried);
-                let grown = |k: usize| returns[k].0 * images[k].derivative.norm();
-                let kept = (0..tried.len()).filter(|k| grown(*k) < LOST);
-                tried = kept.map(|k| tried[k]).collect();
-            }
+            let tried: Vec<_> = returns.iter().map(|(_, start, n)| (*start, *n)).collect();
             let mut traps = Vec::new();
             for orbit in newton::find_others(&steps, &tried, REACH, &[]) {
                 if let Some(orbit) = self.refined(strobe, map, orbit) {

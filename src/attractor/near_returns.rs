@@ -2,7 +2,6 @@
 
 use std::cmp::Ordering;
 
-use super::effort::Effort;
 use crate::integrate::{State, States, Strobe};
 use crate::model::effects::Action;
 use crate::model::{Angle, Effect, Pendulum};
@@ -16,44 +15,25 @@ const ESCAPE: f64 = 10.0;
 /// its period, and one that stays on an orbit that repels after any number.
 const TRIED: usize = 3;
 
-/// A return after a multiple of the periods of another one is of the same orbit if the other is not farther by this factor.
-const ALIKE: f64 = 4.0;
-
 /// A near return: distance, state, number of periods.
 pub(super) type Return = (f64, State, usize);
 
 /// The near returns of all trajectories, nearest first, and of each the nearest few.
 ///
 /// Converged trajectories come before the chance returns of chaos.
-pub(super) fn near_returns(strobe: &Strobe, tracks: &[Vec<State>], effort: &Effort) -> Vec<Return> {
+pub(super) fn near_returns(strobe: &Strobe, alive: &[State], longest: usize) -> Vec<Return> {
     let mut returns: Vec<Return> = Vec::new();
-    for track in tracks {
+    for track in tracks(strobe, alive, longest) {
         if strobe.friction && track.iter().all(|state| state[1] == 0.0) {
             // Held at every period's end: no orbit, and every n would match.
             continue;
         }
-        let mut own: Vec<Return> = returns_of(strobe.angle, track, effort.longest_cycle).collect();
-        if !effort.precise {
-            own = without_multiples(own);
-        }
+        let mut own: Vec<Return> = returns_of(strobe.angle, &track, longest).collect();
         own.sort_by(nearer);
         returns.extend(own.into_iter().take(TRIED));
     }
     returns.sort_by(nearer);
     returns
-}
-
-/// The returns, in the order of their periods, without those after a multiple of the periods of another one that is about
-/// as near: of one orbit.
-fn without_multiples(own: Vec<Return>) -> Vec<Return> {
-    let mut apart: Vec<Return> = Vec::new();
-    for one in own {
-        let of = |other: &Return| one.2.is_multiple_of(other.2) && other.0 < ALIKE * one.0;
-        if !apart.iter().any(of) {
-            apart.push(one);
-        }
-    }
-    apart
 }
 
 fn nearer(a: &Return, b: &Return) -> Ordering {

@@ -6,7 +6,6 @@ use super::capture::{self, Fate};
 use super::chaos::{self, ChaoticSet, spread};
 use super::find::{Catalogue, Ending, open};
 use super::kind::Kind;
-use super::near_returns::tracks;
 use crate::error::Error;
 use crate::integrate::{State, Strobe};
 
@@ -63,8 +62,7 @@ impl Catalogue {
         if runs.iter().all(|run| run.fate != Fate::Open) {
             return Ok(());
         }
-        let tracks = tracks(strobe, &open(endings), self.effort.longest_cycle);
-        if self.find_cycles(strobe, &self.effort.map(strobe), &tracks, cancel)? {
+        if self.find_cycles(strobe, &self.effort.map(strobe), &open(endings), cancel)? {
             // They have settled by now.
             return self.observe(strobe, endings, bound, cancel);
         }

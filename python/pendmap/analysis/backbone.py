@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import xarray as xr
 from numpy.polynomial import legendre
-from scipy.optimize import brentq  # type: ignore[import-untyped]
+from scipy.optimize import brentq
 
 from pendmap import _core
 from pendmap.analysis import result
@@ -230,8 +230,8 @@ class _Force:
         for k in falls:
             rest = self.zero(theta[k], theta[k + 1])
             if -math.pi < rest <= math.pi:
-                ends = rises[rises < k][-1], rises[rises > k][0]
-                yield rest, tuple(self.zero(theta[j], theta[j + 1]) for j in ends)
+                j, m = rises[rises < k][-1], rises[rises > k][0]
+                yield rest, (self.zero(theta[j], theta[j + 1]), self.zero(theta[m], theta[m + 1]))
 
     def zero(self, low: float, high: float) -> float:
         """Return the angle at which the force passes 0."""

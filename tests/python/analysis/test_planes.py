@@ -174,7 +174,7 @@ def test_sweeps_start_where_they_are_told_and_mirror_images_are_no_difference() 
     for start, kind in (((1.2, -2.3), "rotation 1:-1"), ((-1.196, 0.29), "oscillation 2:0")):
         found = pendmap.bifurcation(Pendulum(), ranges, start=start)
         assert found["kind"].values[found["entry_kind"].values[found["up"].values[0]]] == kind
-    found = pendmap.bifurcation(Pendulum(), {"p": (0.98, 1.5, 27)})
+    found = pendmap.bifurcation(Pendulum(), {"p": (1.0, 1.5, 26)})
     on = [found[sweep].values[found["p"].values > 1.4] for sweep in ("up", "down")]
     assert (found["entry_w"].values[on[0]] == -found["entry_w"].values[on[1]]).all()
     # From p = 1.36 on they are mirror images of one another.
