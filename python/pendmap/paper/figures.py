@@ -158,8 +158,8 @@ def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
     if key == "1":
         marks = [(one.p, one.omega, name[-1]) for name, one in sorted(PRESETS.items())]
         omega = 1 / np.sqrt(np.linspace(*_SQUARES, _COLUMNS)[::-1])
-        found = pendmap.tongues(PRESETS["fig2a"], omega, _HIGHEST / _SQUARES[0])
-        return render.draw(tongues.chart(found, layer="e-alpha2", title=title, marks=marks), path)
+        rests = pendmap.tongues(PRESETS["fig2a"], omega, _HIGHEST / _SQUARES[0])
+        return render.draw(tongues.chart(rests, layer="e-alpha2", title=title, marks=marks), path)
     if key == "2":
         return render.draw(tumbling_chart(tumbling(), title), path)
     if key == "3":
