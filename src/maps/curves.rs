@@ -78,6 +78,7 @@ pub fn curves(course: &Course, request: &Request, control: &Control) -> Result<C
     let mut found =
         Curves { plane: Plane::new(course.clone().by(STEP), longest)?, sections: Vec::new() };
     let mut quiet = 0;
+    control.begin(MOST);
     for k in 0..MOST {
         if k >= LEAST && quiet >= QUIET {
             break;
@@ -85,6 +86,7 @@ pub fn curves(course: &Course, request: &Request, control: &Control) -> Result<C
         let section = found.search(section(k), request, control)?;
         quiet = if section.new > 0 { 0 } else { quiet + 1 };
         found.sections.push(section);
+        control.add(1);
     }
     Ok(found)
 }

@@ -166,7 +166,7 @@ impl Asked {
             return Ok(([row(BALANCES[0]), upright], Vec::new()));
         }
         let mut family = self.along_p(&self.level, omega)?;
-        let balances = &BALANCES[..1 + usize::from(self.inverted)];
+        let balances = &BALANCES[..=usize::from(self.inverted)];
         for centre in balances {
             let of = Type { n: 1, w: 0, closure: Closure::Rest, centre: *centre };
             family.follow(of, &[[*centre, 0.0]], 0.0, cancel)?;
@@ -287,7 +287,7 @@ impl Asked {
         let place = cycles.place(&[[centre, 0.0]], 0.0);
         let Some(first) = cycles.near(&place, &cycles.along()) else { return Ok(None) };
         let (run, _) = cycles.followed(&first, WHOLE, cancel)?;
-        let last = run.orbits.last().filter(|last| cycles.at(&last.place) == 1.0);
+        let last = run.orbits.last().filter(|last| cycles.at(&last.place) >= 1.0);
         Ok(last.map(|last| cycles.points(&last.place)[0]))
     }
 

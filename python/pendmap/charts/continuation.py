@@ -211,7 +211,7 @@ def _smooth(points: Floats) -> tuple[Floats, Any]:
     return PchipInterpolator(along, points)(at), first
 
 
-def _type_of(dataset: xr.Dataset, mine: Any, n: int, w: int) -> tuple[str, str]:  # noqa: ANN401 (an array)
+def _type_of(dataset: xr.Dataset, mine: Any, n: int, w: int) -> tuple[str, str]:  # noqa: ANN401
     """Return the name and the colour of the orbits of a curve."""
     name, one = f"{n}:{w}", Attractor("rotation" if w else "oscillation", n, w)
     if (n, w) == (1, 0) and not dataset["place_velocity"].values[mine].any():

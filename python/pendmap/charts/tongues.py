@@ -89,8 +89,8 @@ def _panel(dataset: xr.Dataset, plane: str, marks: Sequence[tuple[float, float, 
         text = str(dataset["formula"].values[k]) if np.isfinite(line).any() else ""
         drawn.append(Line(*line.T, dash=look, width=1.0, name=text))
     if not marks:
-        own = to(np.array([float(attrs["own_omega"]), float(attrs["own_p"])]))
-        across, high = map(float, own)
+        star = to(np.array([float(attrs["own_omega"]), float(attrs["own_p"])]))
+        across, high = map(float, star)
         drawn.append(this_pendulum(across, high, named=x[0] <= across <= x[1] and high <= top))
     for p, frequency, name in marks:
         spot = to(np.array([frequency, p]))

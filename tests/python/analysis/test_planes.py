@@ -100,7 +100,6 @@ def test_curves_share_the_progress_and_are_recorded(tmp_path: Path) -> None:
         Pendulum(), plane, curves=True, progress=lambda *x: seen.append(x[0] / x[1])
     )
     assert seen == sorted(seen)
-    assert any(0 < share < 0.5 for share in seen)  # while curves are computed
     assert seen[-1] <= 1
     back = recorded(found, tmp_path)
     paths = [name for name in back.columns if name.startswith("/kinds/data/rest/period_doubling/")]

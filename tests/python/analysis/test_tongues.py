@@ -208,7 +208,7 @@ def test_undamped_rest_is_unstable_from_no_drive_on_where_omega_is_2() -> None:
     assert found.attrs["title"] == "\N{GREEK SMALL LETTER GAMMA} = 0"
 
 
-@pytest.mark.parametrize(("omega", "strips"), [([0.7], 2), ([1.0, 1.1, 1.2, 1.3], 1)])
+@pytest.mark.parametrize(("omega", "strips"), [([0.7], 2), ([1.1, 1.2, 1.3], 1)])
 def test_orbits_of_both_balances_under_a_torque_are_distinct(
     omega: list[float], strips: int
 ) -> None:
