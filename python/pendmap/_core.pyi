@@ -41,6 +41,7 @@ __all__ = [
     "continuation",
     "counts_turns",
     "default_threads",
+    "distance",
     "effects",
     "fit_rows",
     "fit_runs",
@@ -48,6 +49,8 @@ __all__ = [
     "growth",
     "kinds",
     "lyapunov",
+    "matched",
+    "numbered",
     "orbits",
     "orbits_near",
     "parameter_names",
@@ -470,7 +473,7 @@ def matched(
     old: Sequence[Sequence[Sequence[float]]],
     new: Sequence[Sequence[Sequence[float]]],
     reach: Sequence[Sequence[float]],
-    continued: Sequence[tuple[int, int]] = (),
+    continued: Sequence[tuple[int, int]] = ...,
     circle: bool = True,
 ) -> list[tuple[bool, float, int, int]]: ...
 def numbered(

@@ -18,6 +18,8 @@ const EXACT: f64 = 1e-14;
 const ROUGH: f64 = 1e-9;
 /// Relative difference of equal entries.
 const EVEN: f64 = 1e-9;
+/// Events of one kind at this distance are one.
+const ROUNDING: f64 = 1e-12;
 
 /// The kind of an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -200,6 +202,14 @@ fn passed(cycles: &Cycles<'_>, here: &Orbit, next: &Orbit, run: &mut Run) {
     }
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
     for (_, kind, orbit, rises) in found {
+        // A step that ends on an event passes it once.
+        let same = |event: &Event| {
+            let away = (&run.orbits[event.orbit].place - &orbit.place).norm();
+            event.kind == kind && away < ROUNDING
+        };
+        if run.events.last().is_some_and(same) {
+            continue;
+        }
         run.orbits.push(orbit);
         let orbit = run.orbits.len() - 1;
         run.events.push(Event { kind, orbit, rises, supercritical: None, smooth: true });

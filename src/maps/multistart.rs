@@ -33,7 +33,7 @@ const DIFFERENCE: f64 = 1e-5;
 /// Largest step in the plane.
 const LONGEST_STEP: f64 = 0.5;
 /// Size of the field at which Newton's method has converged.
-const NEAR: f64 = 1e-7;
+const NEAR: f64 = 1e-4;
 /// Distance below which two points are identical.
 const SAME: f64 = 1e-5;
 

@@ -45,9 +45,6 @@ const CREEPS: f64 = 1e-3;
 /// two of them.
 const LOOKS: usize = 2000;
 const BISECTIONS: usize = 60;
-/// Starts of Newton's method at once, and the distance from an orbit at which they are on it.
-const BATCH: usize = 16;
-const ARRIVED: f64 = 1e-5;
 /// Orbits near another one are sought only if the derivative of the displacement shrinks a
 /// direction below this.
 const WEAK: f64 = 0.3;
@@ -130,27 +127,23 @@ pub fn orbits(pendulum: &Pendulum, request: &Request, control: &Control) -> Resu
     while !next.is_empty() {
         control.begin(next.len());
         begun += next.len();
+        let search = |start: &State| {
+            control.check()?;
+            let orbit = newton::find_other(&map, *start, request.n, reach, &known);
+            control.add(1);
+            Ok(orbit)
+        };
+        let found: Vec<Option<PeriodicOrbit>> =
+            pool.install(|| next.par_iter().map(search).collect::<Result<_, Error>>())?;
         let before = all.len();
-        for some in next.chunks(BATCH) {
-            let search = |start: &State| {
-                control.check()?;
-                control.add(1);
-                // From a point of an orbit Newton's method finds that orbit.
-                let arrived = all.iter().any(|orbit| orbit.contains(*start, ARRIVED));
-                let find = || newton::find_other(&map, *start, request.n, reach, &known);
-                Ok(if arrived { None } else { find() })
-            };
-            let found: Vec<Option<PeriodicOrbit>> =
-                pool.install(|| some.par_iter().map(search).collect::<Result<_, Error>>())?;
-            for orbit in found.into_iter().flatten() {
-                if is_held(pendulum, &orbit) {
-                    continue;
-                }
-                let image = mirror.as_ref().and_then(|m| Some(m.orbit(&map, &orbit)?.0));
-                for one in std::iter::once(orbit).chain(image) {
-                    if !all.iter().any(|other| other.is_same(&one)) {
-                        all.push(one);
-                    }
+        for orbit in found.into_iter().flatten() {
+            if is_held(pendulum, &orbit) {
+                continue;
+            }
+            let image = mirror.as_ref().and_then(|m| Some(m.orbit(&map, &orbit)?.0));
+            for one in std::iter::once(orbit).chain(image) {
+                if !all.iter().any(|other| other.is_same(&one)) {
+                    all.push(one);
                 }
             }
         }

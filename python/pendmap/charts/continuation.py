@@ -66,7 +66,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     sides = names.phase_plane(theta, holding(dataset["point_velocity"].values), units)
     label = names.symbol(name, str(dataset["orbit_value"].attrs.get("units", "1")))
     below = Axis(label, (float(a["low"]), float(a["high"])))
-    types = dict.fromkeys(rows(dataset, "branch_n", "branch_w"))
+    types = dict.fromkeys((n, abs(w)) for n, w in rows(dataset, "branch_n", "branch_w"))
     colours = dict(zip(types, itertools.cycle(_COLOURS), strict=False))
     panels = [
         Panel(which, "", below, side, [*lines(dataset, which, colours), *events(dataset, which)])
@@ -105,7 +105,8 @@ def lines(
                 line[wraps if which == "theta" else np.zeros_like(wraps)] = np.nan
                 look: dict[str, Any] = _UNSTABLE
                 if colours:
-                    look = {"colour": colours[n, w], "name": f"{n}:{w}" if way + k == 0 else ""}
+                    name = f"{n}:{abs(w)}" if way + k == 0 else ""
+                    look = {"colour": colours[n, abs(w)], "name": name}
                 yield Line(x, line, dash=dash, path=f"branch/{number}/{way}/{k}", **look)
 
 
