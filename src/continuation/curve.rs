@@ -15,6 +15,7 @@ use super::cycle::Type;
 use super::event::Kind;
 use crate::error::{Error, unless_cancelled};
 use crate::integrate::State;
+use crate::model::Parameter;
 use crate::model::pendulum::Symmetry;
 
 /// The first, the longest and the shortest step.
@@ -36,8 +37,10 @@ const CLOSE: f64 = 0.1;
 /// Refinements of a zero at most, and the part of a step at which it is known.
 const REFINEMENTS: usize = 40;
 const EXACT: f64 = 1e-14;
-/// A determinant that should be 0 is at most this.
+/// A multiplier this far from the critical one is not critical.
 const VAGUE: f64 = 1e-5;
+/// A drive below this is none.
+const STILL: f64 = 1e-9;
 /// A coefficient that vanishes is at most this part of those beside it.
 const ZERO: f64 = 1e-4;
 
@@ -119,6 +122,10 @@ impl Critical<'_> {
                 run.end = End::Lost(next.orbit.norm);
                 break;
             }
+            if self.is_undriven(&next.orbit.place) {
+                run.end = End::Undriven;
+                break;
+            }
             if next.orbit.place.amax() > FASTEST {
                 run.end = End::Fast;
                 break;
@@ -182,8 +189,19 @@ impl Critical<'_> {
 
     /// Whether rounding hides that a multiplier is critical.
     fn is_vague(&self, point: &Point) -> bool {
-        let test = point.orbit.tests[usize::from(self.multiplier() < 0.0)];
-        test.abs() > VAGUE
+        // The product of the distances of both multipliers from it, and about that of the other one.
+        let tests = point.orbit.tests;
+        let test = tests[usize::from(self.multiplier() < 0.0)];
+        let other = 1.0 + 0.5 * (tests[1] - tests[0]).abs();
+        test.abs() > VAGUE * other
+    }
+
+    /// Whether nothing drives the pendulum there: without damping all rotations at one velocity have the multiplier 1.
+    pub(super) fn is_undriven(&self, place: &DVector<f64>) -> bool {
+        let mut still = self.cycles.course.pendulum(&Self::at(place));
+        let weak = still.drive.p.abs() < STILL;
+        still.set(Parameter::P, 0.0);
+        weak && still.is_autonomous()
     }
 
     /// The coefficient of the normal form, precise or to some digits; not a number where it is not known.

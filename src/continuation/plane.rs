@@ -144,6 +144,9 @@ impl Plane {
         let mut row = DVector::zeros(place.len());
         row[place.len() - 2 + seed.along] = 1.0;
         let Some(first) = critical.near(&place, &row, None) else { return Ok(()) };
+        if critical.is_undriven(&first.orbit.place) {
+            return Ok(());
+        }
         if first.orbit.moved > SAME && self.passes(of, seed.kind, &first.orbit.place) {
             return Ok(());
         }

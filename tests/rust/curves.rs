@@ -159,3 +159,17 @@ fn a_branch_has_few_steps_where_motions_part_within_a_period() {
     let steps: Vec<usize> = shed.map(|branch| branch.run.orbits.len()).collect();
     assert!(!steps.is_empty() && steps.iter().all(|count| *count < 400), "{steps:?}");
 }
+
+#[test]
+fn without_damping_no_curve_lies_where_nothing_drives() {
+    let base = Pendulum::new(0.0, 1.0, 2.0, 0.0, 0.0).unwrap();
+    let request = Request { longest: 1, only: Some(vec![(1, 0), (1, 1)]), threads: 1 };
+    let law = |[low, high]: [f64; 2]| Law::Quadratic([low, high - low, 0.0]);
+    let axes =
+        vec![vec![(Parameter::P, law([0.0, 1.5]))], vec![(Parameter::Omega, law([1.5, 2.5]))]];
+    let found = curves(&Course::new(base, axes), &request, &Control::default()).unwrap();
+    assert!(found.plane.curves.iter().any(|curve| curve.ends.contains(&End::Undriven)));
+    for curve in &found.plane.curves {
+        assert!(curve.points.iter().any(|point| Critical::at(&point.orbit.place)[0] > 1e-6));
+    }
+}
