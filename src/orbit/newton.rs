@@ -155,7 +155,8 @@ fn orbits_of(
         |&([theta, velocity], n): &(State, usize)| ([map.angle.wrapped(theta), velocity], n);
     let firsts: Vec<(State, usize)> = closed.iter().map(wrapped).collect();
     let orbit = |((first, n), course): (&(State, usize), Vec<Image>)| {
-        let returns = |d: &usize| map.angle.distance(course[d - 1].state, *first) < SAME_POINT;
+        // Beside its doubling a shorter orbit is known to less than rounding, as one of twice the period.
+        let returns = |d: &usize| map.angle.distance(course[d - 1].state, *first) < SAME;
         let smallest = (1..*n).filter(|d| n.is_multiple_of(*d)).find(returns);
         match smallest {
             Some(d) => {
