@@ -32,6 +32,9 @@ const CHANGE: [f64; 2] = [0.25, 2.0];
 /// Points of a curve at most, and the fastest motion of an orbit.
 const POINTS: usize = 5_000;
 const FASTEST: f64 = 1e3;
+/// A step this short, and so many of them in a row that the curve runs along another one, too near to be told apart.
+const SHORT: f64 = 1e-3;
+const CRAWLS: usize = 60;
 /// An interpolated place between two points is this near to the curve, in parts of their distance.
 const CLOSE: f64 = 0.1;
 /// Refinements of a zero at most, and the part of a step at which it is known.
@@ -100,6 +103,7 @@ impl Critical<'_> {
         let end = End::Lost(first.orbit.norm);
         let mut run = Run { points: vec![first.clone()], degenerate: Vec::new(), end, met: None };
         let (mut length, mut refused) = (FIRST, None);
+        let mut crawled = 0;
         while run.points.len() < POINTS {
             unless_cancelled(cancel)?;
             let here = run.points[run.points.len() - 1].clone();
@@ -146,6 +150,11 @@ impl Critical<'_> {
             self.add(&mut run, &here, last);
             if closes {
                 run.end = End::Closed;
+                break;
+            }
+            crawled = if length < SHORT { crawled + 1 } else { 0 };
+            if crawled > CRAWLS {
+                run.end = End::Lost(here.orbit.norm);
                 break;
             }
             length = (length * factor).min(LONGEST);

@@ -108,8 +108,6 @@ pub fn orbits(pendulum: &Pendulum, request: &Request, control: &Control) -> Resu
             return Ok(Orbits { running, ..none });
         }
     }
-    let map = PoincareMap::new(pendulum);
-    let mirror = Mirror::of(pendulum);
     let cell = |axis: Axis| (axis.high - axis.low) / axis.count as f64;
     let reach = LEAST_REACH.max(REACH_CELLS * cell(request.theta).hypot(cell(request.velocity)));
     let begin = if pendulum.is_autonomous() {
@@ -117,6 +115,9 @@ pub fn orbits(pendulum: &Pendulum, request: &Request, control: &Control) -> Resu
     } else {
         beginnings(pendulum, request, reach, control)?
     };
+    // After the search, which refuses a drive that steps cannot follow.
+    let map = PoincareMap::new(pendulum);
+    let mirror = Mirror::of(pendulum);
     let pool = pool(request.threads)?;
     let mut all: Vec<PeriodicOrbit> = Vec::new();
     let mut begun = 0;

@@ -57,6 +57,10 @@ pub struct Critical {
     pub stable: [bool; 2],
 }
 
+/// Amplitudes of one rest this near to one another, in parts of the range, are listed and not followed: a strip between them
+/// has no width in a figure.
+const NARROW: f64 = 1e-3;
+
 /// Critical amplitudes of a rest at one frequency.
 #[derive(Clone, Debug, Default)]
 pub struct Row {
@@ -315,7 +319,13 @@ impl Asked {
             return Ok(None);
         }
         for (omega, seeds) in omegas.iter().zip(seeds) {
-            for seed in seeds {
+            for (k, seed) in seeds.iter().enumerate() {
+                let beside = |(j, other): (usize, &Seed)| {
+                    j != k && other.of == seed.of && (other.at[0] - seed.at[0]).abs() < NARROW
+                };
+                if seeds.iter().enumerate().any(beside) {
+                    continue;
+                }
                 let at = [seed.at[0], (omega - low) / (high - low)];
                 plane.add(&Seed { at, ..seed.clone() }, cancel)?;
             }

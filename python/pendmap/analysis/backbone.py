@@ -104,7 +104,7 @@ def backbone(pendulum: Pendulum | Rig, *, energy_max: float = 6.0, count: int = 
     >>> import pendmap
     >>> result = pendmap.backbone(pendmap.Pendulum(), count=3)
     >>> result.motion_amplitude.values[:2].round(4), result.motion_period.values[:2].round(4)
-    (array([0.6797, 1.4595]), array([6.4703, 7.268 ]))
+    (array([0.5054, 1.0472]), array([6.385, 6.743]))
     """
     bare, units = without_dimensions(pendulum)
     energy_max = check_number("energy_max", energy_max)
