@@ -2,7 +2,7 @@
 //!
 //! Branches are followed along sections of the plane: first along its edges, where every curve ends that does not end within,
 //! then in both directions in turn, each in the largest gap that the golden section leaves. On a section all orbits are
-//! searched at some places, as by [`super::every_orbit`]. Each event on their branches is a point of a curve, which is followed
+//! searched at some places, as by `every_orbit`. Each event on their branches is a point of a curve, which is followed
 //! if none passes there yet, until sections in a row have had no new one.
 
 use super::control::Control;
