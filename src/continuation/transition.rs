@@ -110,8 +110,8 @@ pub(super) fn crossed(run: &mut Run, before: &Orbit, after: Orbit) {
     let last = before.tangent.len() - 1;
     if before.tangent[last] * after.tangent[last] < 0.0 {
         kinds.push(Kind::Fold);
-    }
-    if before.tests[1] * after.tests[1] < 0.0 {
+    } else if before.tests[1] * after.tests[1] < 0.0 {
+        // Where the branch turns back no orbit is left to double.
         kinds.push(Kind::PeriodDoubling);
     }
     let rises = (after.tests[1] - before.tests[1]).signum();
