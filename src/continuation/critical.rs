@@ -160,13 +160,13 @@ impl Critical<'_> {
         let sides = self.images(&map, &sides);
         let per_unit = right.norm() / (2.0 * BESIDE);
 
-        let (shift, factors) = (self.cycles.closing().1, self.factors());
+        let factors = self.factors();
         let mut gap = DVector::zeros(moving + 1);
         let mut matrix = DMatrix::zeros(moving + 1, moving + 2);
         let mut square = 0.0;
         gap[moving] = g;
         for i in 0..count {
-            let (image, factor, last) = (&images[i], factors[i], i + 1 == count);
+            let (image, factor) = (&images[i], factors[i]);
             let w = Vector2::new(left[2 * i], left[2 * i + 1]) * factor;
             let turned = (sides[0][i].by_state - sides[1][i].by_state) * per_unit;
             let along = Vector2::new(right[2 * i], right[2 * i + 1]);
@@ -178,15 +178,8 @@ impl Critical<'_> {
             if moving == 0 {
                 continue;
             }
-            let next = points[(i + 1) % count];
+            self.cycles.close((i, image), &points, &mut gap, &mut matrix);
             for row in 0..2 {
-                let moved = if last && row == 0 { shift } else { 0.0 };
-                gap[2 * i + row] = factor * image.state[row] + moved - next[row];
-                for column in 0..2 {
-                    matrix[(2 * i + row, 2 * i + column)] +=
-                        factor * root * image.by_state[(row, column)];
-                }
-                matrix[(2 * i + row, (2 * i + 2 + row) % moving)] -= root;
                 for k in 0..2 {
                     matrix[(2 * i + row, moving + k)] = factor * image.by_course[k][row];
                 }

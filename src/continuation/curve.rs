@@ -12,7 +12,7 @@ use nalgebra::DVector;
 use super::branch::{End, SAME, interpolated, predicted};
 use super::critical::{Critical, Point};
 use super::cycle::Type;
-use super::event::Kind;
+use super::event::{EXACT, Kind, REFINEMENTS};
 use crate::error::{Error, unless_cancelled};
 use crate::integrate::State;
 use crate::model::Parameter;
@@ -37,9 +37,6 @@ const SHORT: f64 = 1e-3;
 const CRAWLS: usize = 60;
 /// An interpolated place between two points is this near to the curve, in parts of their distance.
 const CLOSE: f64 = 0.1;
-/// Refinements of a zero at most, and the part of a step at which it is known.
-const REFINEMENTS: usize = 40;
-const EXACT: f64 = 1e-14;
 /// A multiplier this far from the critical one is not critical.
 const VAGUE: f64 = 1e-5;
 /// A drive below this is none.

@@ -189,29 +189,43 @@ impl Cycles<'_> {
         if half > 0 {
             images.extend(map.images(&points[whole..], 0.5));
         }
-        let (count, root) = (points.len(), self.root());
-        let (sign, shift) = self.closing();
+        let count = points.len();
         let mut gap = DVector::zeros(2 * count);
         let mut matrix = DMatrix::zeros(2 * count, 2 * count + 1);
         let mut norm = 0.0_f64;
         for (i, image) in images.iter().enumerate() {
-            let last = i + 1 == count;
-            let next = points[(i + 1) % count];
-            let factor = if last { sign } else { 1.0 };
+            let factor = if i + 1 == count { self.closing().0 } else { 1.0 };
+            self.close((i, image), &points, &mut gap, &mut matrix);
             for row in 0..2 {
-                let moved = if last && row == 0 { shift } else { 0.0 };
-                gap[2 * i + row] = factor * image.state[row] + moved - next[row];
-                for column in 0..2 {
-                    matrix[(2 * i + row, 2 * i + column)] +=
-                        factor * root * image.by_state[(row, column)];
-                }
-                matrix[(2 * i + row, (2 * i + 2 + row) % (2 * count))] -= root;
                 matrix[(2 * i + row, 2 * count)] = factor * self.scale * image.by_course[0][row];
             }
             norm = norm.max(image.by_state.norm());
         }
         let finite = gap.iter().chain(matrix.iter()).all(|x| x.is_finite());
         finite.then_some(System { gap, matrix, images, norm })
+    }
+
+    /// Adds to a system that an image is the next point: its gap, and the derivatives by the points.
+    pub(super) fn close(
+        &self,
+        (i, image): (usize, &Image),
+        points: &[State],
+        gap: &mut DVector<f64>,
+        matrix: &mut DMatrix<f64>,
+    ) {
+        let (count, root) = (points.len(), self.root());
+        let last = i + 1 == count;
+        let (sign, shift) = if last { self.closing() } else { (1.0, 0.0) };
+        let next = points[(i + 1) % count];
+        for row in 0..2 {
+            let moved = if row == 0 { shift } else { 0.0 };
+            gap[2 * i + row] = sign * image.state[row] + moved - next[row];
+            for column in 0..2 {
+                matrix[(2 * i + row, 2 * i + column)] +=
+                    sign * root * image.by_state[(row, column)];
+            }
+            matrix[(2 * i + row, (2 * i + 2 + row) % (2 * count))] -= root;
+        }
     }
 
     /// The orbit near `guess` in the plane through it across `row`, by Newton's method; its tangent has the sense

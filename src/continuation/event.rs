@@ -12,9 +12,9 @@ use super::branch::{Run, interpolated};
 use super::cycle::{Closure, Cycles, Orbit};
 
 /// Refinements of a zero at most, and the part of a step at which it is known.
-const REFINEMENTS: usize = 40;
-const EXACT: f64 = 1e-14;
-/// The same where steps are too long for that.
+pub(super) const REFINEMENTS: usize = 40;
+pub(super) const EXACT: f64 = 1e-14;
+/// The part of a step at which a zero is known where the steps of the map err by more than rounding.
 const ROUGH: f64 = 1e-9;
 /// Relative difference of equal entries.
 const EVEN: f64 = 1e-9;

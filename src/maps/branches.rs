@@ -153,7 +153,7 @@ fn asked(
 }
 
 /// The velocity of a fall from the top under the drive's largest acceleration.
-fn falling(pendulum: &Pendulum) -> f64 {
+pub(super) fn falling(pendulum: &Pendulum) -> f64 {
     2.0 * (1.0 + pendulum.drive.p.abs()).sqrt()
 }
 

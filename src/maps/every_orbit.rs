@@ -7,6 +7,7 @@
 use std::f64::consts::{PI, TAU};
 
 use super::advance::advance;
+use super::branches::falling;
 use super::control::Control;
 use super::multistart::{approach, places};
 use super::orbits::is_held;
@@ -46,8 +47,7 @@ pub fn every_orbit(
 ) -> Result<Vec<PeriodicOrbit>, Error> {
     let mirrored = pendulum.symmetry() == Some(Symmetry::AtOnce);
     // A fall from the top under the largest acceleration, or a rotation by a turn a period.
-    let fall = 2.0 * (1.0 + pendulum.drive.p.abs()).sqrt();
-    let reach = fall.hypot(TAU / pendulum.period());
+    let reach = falling(pendulum).hypot(TAU / pendulum.period());
     let sides = if mirrored { 1 } else { 2 };
     let low = if mirrored { 0.0 } else { -reach };
     let simd = InstructionSet::choose()?;
