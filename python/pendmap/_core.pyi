@@ -170,6 +170,10 @@ class BifurcationSet:
     degenerate_kind: list[str]
     degenerate_place: _Places
     sections: list[tuple[int, float, int, int]]
+    types: list[tuple[str, int, int]]
+    borders: list[tuple[int, int]]
+    stable: list[NDArray[np.int16]]
+    regions: list[tuple[int, float, float, float, int]]
 
 @final
 class Texture:
@@ -456,7 +460,7 @@ def bifurcation_set(
     model: Pendulum,
     axes: tuple[tuple[Sequence[float], _Range], tuple[Sequence[float], _Range]],
     longest: int,
-    only: Sequence[tuple[int, int]] | None,
+    regions: bool,
     threads: int,
     progress: _Progress | None = None,
 ) -> BifurcationSet: ...

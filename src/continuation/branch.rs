@@ -326,7 +326,8 @@ pub(super) fn predicted(before: Option<&Orbit>, here: &Orbit, length: f64) -> DV
 }
 
 /// A part of the way between two orbits, by Hermite's cubic.
-pub(super) fn interpolated(a: &Orbit, b: &Orbit, part: f64) -> DVector<f64> {
+#[must_use]
+pub fn interpolated(a: &Orbit, b: &Orbit, part: f64) -> DVector<f64> {
     let away = &b.place - &a.place;
     let length = away.norm();
     let rest = 1.0 - part;

@@ -154,7 +154,8 @@ impl Family {
     }
 
     /// The type of an orbit and the points that [`Cycles`] has of it.
-    fn type_of(&self, orbit: &PeriodicOrbit, at: f64) -> Option<(Type, Vec<State>)> {
+    #[must_use]
+    pub fn type_of(&self, orbit: &PeriodicOrbit, at: f64) -> Option<(Type, Vec<State>)> {
         let map = Period::<3>::new(&self.course, &[at]);
         let mut points = vec![*orbit.points.first()?];
         for k in 1..orbit.n {

@@ -36,8 +36,6 @@ const GOLDEN: f64 = 0.618_033_988_749_894_9;
 pub struct Request {
     /// Longest period of orbits.
     pub longest: usize,
-    /// Periods and net turns of the orbits that are searched and whose curves are followed; none for all.
-    pub only: Option<Vec<(usize, i64)>>,
     /// Workers; 0 for one a processor.
     pub threads: usize,
 }
@@ -102,12 +100,6 @@ fn section(k: usize) -> (usize, f64) {
     }
 }
 
-impl Request {
-    fn wants(&self, n: usize, w: i64) -> bool {
-        self.only.as_ref().is_none_or(|types| types.contains(&(n, w)))
-    }
-}
-
 impl Curves {
     /// Searches one section.
     fn search(
@@ -129,8 +121,9 @@ impl Curves {
             let at = (0.5 + GOLDEN * k as f64).fract();
             let known = family.branches.len();
             let pendulum = family.pendulum(at);
-            let all = every_orbit(&pendulum, request.longest, request.threads, control)?;
-            for orbit in all.iter().filter(|orbit| request.wants(orbit.n, orbit.w)) {
+            let Request { longest, threads, .. } = *request;
+            let all = every_orbit(&pendulum, longest, f64::INFINITY, threads, control)?;
+            for orbit in &all {
                 section.orbits += 1;
                 if !family.passes(orbit, at) {
                     family.add(orbit, at, control.flag())?;
@@ -139,23 +132,19 @@ impl Curves {
             section.places += 1;
             idle = if family.branches.len() > known { 0 } else { idle + 1 };
         }
-        section.new = self.add(&family, (axis, held.1), request, control)?;
+        section.new = self.add(&family, (axis, held.1), control)?;
         Ok(section)
     }
 
     /// Adds the curves through the events of the branches; the number of new ones.
-    fn add(
+    pub(super) fn add(
         &mut self,
         family: &Family,
         (axis, held): (usize, f64),
-        request: &Request,
         control: &Control,
     ) -> Result<usize, Error> {
         let before = self.plane.curves.len();
         for branch in &family.branches {
-            if !request.wants(branch.of.n, branch.of.w) {
-                continue;
-            }
             let cycles = family.cycles(branch.of);
             for event in branch.run.events.iter().filter(|event| event.smooth) {
                 if !matches!(event.kind, Kind::Fold | Kind::PeriodDoubling | Kind::SymmetryBreaking)

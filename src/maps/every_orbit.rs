@@ -35,13 +35,15 @@ const ANY_TURNS: [i64; 2] = [-1_000_000, 1_000_000];
 /// A start this near to an orbit leads to it.
 const KNOWN: f64 = 1e-3;
 
-/// Orbits with smallest periods up to `longest`; of mirror images one, where the mirrored motion needs no time.
+/// Orbits with smallest periods up to `longest`; of mirror images one, where the mirrored motion needs no time. Those alone
+/// whose multipliers have a sum of about `steepest` at most; one of stable orbits is below 2.
 ///
 /// # Errors
 /// The errors of [`super::orbits::orbits`].
 pub fn every_orbit(
     pendulum: &Pendulum,
     longest: usize,
+    steepest: f64,
     threads: usize,
     control: &Control,
 ) -> Result<Vec<PeriodicOrbit>, Error> {
@@ -72,12 +74,12 @@ pub fn every_orbit(
             Ok(from.iter().zip(ends.iter().zip(turns)).map(gap).collect())
         };
         let axes = grid(n)?;
-        let places = places(axes, ANY_TURNS, MOST, &displacement)?;
+        let places = places(axes, ANY_TURNS, MOST, steepest, &displacement)?;
         let spread: Vec<(State, i64)> =
             places.iter().step_by(places.len() / MOST + 1).copied().collect();
         let cell = TAU / axes[0].count as f64;
         let far = LEAST_REACH.max(REACH * cell);
-        let near = approach(&spread, far, displacement)?;
+        let near = approach(&spread, far, steepest, displacement)?;
         let known = |state: &State| all.iter().any(|orbit| orbit.contains(*state, KNOWN));
         let starts: Vec<(State, usize)> =
             near.into_iter().filter(|state| !known(state)).map(|state| (state, n)).collect();

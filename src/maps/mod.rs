@@ -9,7 +9,8 @@
 //!   exponents of many trajectories
 //! - [`orbits`]: all periodic orbits of one period and winding; `multistart`: starting points of
 //!   Newton's method; `every_orbit`: those of all periods and windings
-//! - [`branches`]: all branches of orbits of one type along a parameter; [`curves`]: the bifurcation set of a plane
+//! - [`branches`]: all branches of orbits of one type along a parameter; [`curves`]: the bifurcation set of a plane;
+//!   [`pieces`]: where orbits are stable there
 //! - [`parameter_map`]: the attractors over a plane of two parameters; [`survey`]: its blocks; [`cell`],
 //!   [`resolution`]: one pendulum of it, and its step length
 //! - [`bifurcation`]: the attractors along one parameter, and one followed up and down
@@ -41,6 +42,7 @@ pub mod matching;
 mod multistart;
 pub mod orbits;
 pub mod parameter_map;
+pub mod pieces;
 pub mod reliability;
 pub mod resolution;
 pub mod starts;

@@ -217,8 +217,9 @@ fn beginnings(
         };
         Ok(from.iter().zip(ends).map(gap).collect())
     };
-    let places = places([request.theta, request.velocity], request.w, MOST_CELLS, &displacements)?;
-    approach(&places, reach, displacements)
+    let axes = [request.theta, request.velocity];
+    let places = places(axes, request.w, MOST_CELLS, f64::INFINITY, &displacements)?;
+    approach(&places, reach, f64::INFINITY, displacements)
 }
 
 /// Starts near an orbit whose displacement over `n` periods is almost constant in one direction:

@@ -1,13 +1,16 @@
 //! Bindings of the bifurcation set of a plane.
 
-use numpy::PyArray2;
+use numpy::{PyArray1, PyArray2};
+use pendmap::attractor::Kind;
 use pendmap::continuation::course::{Course, Law};
 use pendmap::continuation::critical::Critical;
-use pendmap::continuation::cycle::Closure;
+use pendmap::continuation::cycle::{Closure, Type};
 use pendmap::continuation::plane::Plane;
 use pendmap::error::Error;
 use pendmap::maps::curves::{Request, Section, curves as search};
+use pendmap::maps::pieces::{LEAST, Layer, SIDE, coordinates, pieces};
 use pendmap::model::Parameter;
+use pendmap::model::pendulum::Symmetry;
 use pyo3::prelude::*;
 
 use super::convert::{Array, array};
@@ -42,18 +45,27 @@ pub struct BifurcationSet {
     degenerate_place: Array<i32>,
     /// The coordinate held on each section, its value, orbits found there, new curves.
     sections: Vec<(usize, f64, usize, usize)>,
+    /// Of each type of orbits: kind, period, net turns, and the number of stable orbits at each point of a lattice, -1 where it is
+    /// not known. Of each of its regions: the number of the type, both coordinates of a point inside, the part of the plane, and the
+    /// number of stable orbits.
+    types: Vec<(&'static str, usize, i64)>,
+    /// Numbers of a type and of a curve at which its stable orbits change.
+    borders: Vec<(usize, usize)>,
+    stable: Vec<Py<PyArray1<i16>>>,
+    regions: Vec<(usize, f64, f64, f64, i16)>,
 }
 
 /// Curves of folds, period doublings and symmetry breakings of orbits up to the period `longest` in the plane of two axes;
-/// `only` some periods and net turns.
+/// with `regions` also where how many are stable.
 #[pyfunction]
-#[pyo3(signature = (model, axes, longest, only, threads, progress=None))]
+#[allow(clippy::too_many_arguments)] // what Python passes, and the interpreter
+#[pyo3(signature = (model, axes, longest, regions, threads, progress=None))]
 pub fn bifurcation_set(
     py: Python<'_>,
     model: Model,
     axes: (Axis, Axis),
     longest: usize,
-    only: Option<Vec<(usize, i64)>>,
+    regions: bool,
     threads: usize,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<BifurcationSet> {
@@ -66,13 +78,22 @@ pub fn bifurcation_set(
     };
     let axes = vec![axis(axes.0).map_err(raise)?, axis(axes.1).map_err(raise)?];
     let course = Course::new(base, axes);
-    let request = Request { longest, only, threads };
-    let found = interruptible(py, progress.as_ref(), |control| search(&course, &request, control))?;
-    BifurcationSet::new(py, &found.plane, &found.sections)
+    let request = Request { longest, threads };
+    let (found, layers) = interruptible(py, progress.as_ref(), |control| {
+        let mut found = search(&course, &request, control)?;
+        let layers = if regions { pieces(&mut found, &request, control)? } else { Vec::new() };
+        Ok((found, layers))
+    })?;
+    BifurcationSet::new(py, &found.plane, &found.sections, &layers)
 }
 
 impl BifurcationSet {
-    pub(super) fn new(py: Python<'_>, plane: &Plane, sections: &[Section]) -> PyResult<Self> {
+    pub(super) fn new(
+        py: Python<'_>,
+        plane: &Plane,
+        sections: &[Section],
+        layers: &[Layer],
+    ) -> PyResult<Self> {
         let all = &plane.curves;
         let angle = plane.course.base.angle();
         let sign = |known: Option<bool>| known.map_or(-1, i32::from);
@@ -101,6 +122,23 @@ impl BifurcationSet {
             }
         }
         let meets = |of: Option<(usize, usize)>| of.map_or(-1, |(c, k)| (first[c] + k) as i32);
+        let counted = |stable: Option<usize>| stable.map_or(-1, |count| count as i16);
+        let (mut types, mut borders) = (vec![], vec![]);
+        let (mut stable, mut regions) = (vec![], vec![]);
+        for Layer { of, piece, pieces, curves } in layers {
+            let mirrored = of.w != 0 && plane.symmetry == Some(Symmetry::AtOnce);
+            for w in if mirrored { vec![of.w, -of.w] } else { vec![of.w] } {
+                borders.extend(curves.iter().map(|curve| (types.len(), *curve)));
+                let of_point = piece.iter().map(|number| counted(pieces[*number].stable));
+                stable.push(PyArray1::from_iter(py, of_point).unbind());
+                for one in pieces.iter().filter(|one| one.points >= LEAST) {
+                    let [x, y] = coordinates(one.inside);
+                    let part = one.points as f64 / (SIDE * SIDE) as f64;
+                    regions.push((types.len(), x, y, part, counted(one.stable)));
+                }
+                types.push((kind(*of), of.n, w));
+            }
+        }
         Ok(Self {
             kind: all.iter().map(|one| one.kind.word()).collect(),
             n: array(py, all.iter().map(|one| one.of.n as i32).collect()),
@@ -117,6 +155,21 @@ impl BifurcationSet {
             degenerate_kind,
             degenerate_place: array(py, degenerate_place),
             sections: sections.iter().map(|s| (s.held.0, s.held.1, s.orbits, s.new)).collect(),
+            types,
+            borders,
+            stable,
+            regions,
         })
     }
+}
+
+/// The kind of the orbits of a type.
+fn kind(Type { w, closure, centre, .. }: Type) -> &'static str {
+    let kind = match (w, closure) {
+        (0, Closure::Rest) if centre.cos() > 0.0 => Kind::Rest,
+        (0, Closure::Rest) => Kind::InvertedRest,
+        (0, _) => Kind::Oscillation,
+        _ => Kind::Rotation,
+    };
+    kind.word()
 }

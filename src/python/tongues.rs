@@ -47,7 +47,7 @@ pub fn tongues(
             all.extend(row.critical.iter().map(|critical| (index as i32, inverted, *critical)));
         }
     }
-    let set = found.plane.map(|plane| Py::new(py, BifurcationSet::new(py, &plane, &[])?));
+    let set = found.plane.map(|plane| Py::new(py, BifurcationSet::new(py, &plane, &[], &[])?));
     Ok(Tongues {
         index: array(py, all.iter().map(|one| one.0).collect()),
         inverted: all.iter().map(|one| one.1).collect(),

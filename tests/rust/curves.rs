@@ -13,6 +13,7 @@ use pendmap::continuation::family::Family;
 use pendmap::continuation::plane::{Curve, Plane, Seed};
 use pendmap::maps::control::Control;
 use pendmap::maps::curves::{Request, curves};
+use pendmap::maps::pieces::{LEAST, Layer, SIDE, pieces};
 use pendmap::model::{Parameter, Pendulum};
 use pendmap::orbit::{PoincareMap, newton};
 
@@ -133,19 +134,37 @@ fn the_fold_of_the_oscillation_begins_where_the_doubling_of_rest_changes() {
 }
 
 #[test]
-fn a_search_for_some_types_has_curves_of_these_alone_and_reasons_for_their_ends() {
+fn curves_of_a_part_of_the_plane_have_regions_with_their_stable_orbits() {
     let base = Pendulum::new(0.1, 1.0, 2.0, 0.0, 0.0).unwrap();
-    let request = Request { longest: 2, only: Some(vec![(1, 1)]), threads: 1 };
+    let request = Request { longest: 2, threads: 1 };
     let law = |[low, high]: [f64; 2]| Law::Quadratic([low, high - low, 0.0]);
     let axes =
         vec![vec![(Parameter::P, law([0.0, 1.6]))], vec![(Parameter::Omega, law([1.8, 2.2]))]];
-    let found = curves(&Course::new(base, axes), &request, &Control::default()).unwrap();
-    let kinds: Vec<Kind> = found.plane.curves.iter().map(|curve| curve.kind).collect();
+    let mut found = curves(&Course::new(base, axes), &request, &Control::default()).unwrap();
+    let turning = |curve: &&Curve| (curve.of.n, curve.of.w) == (1, 1);
+    let kinds: Vec<Kind> = found.plane.curves.iter().filter(turning).map(|c| c.kind).collect();
     assert!(kinds.contains(&Kind::Fold) && kinds.contains(&Kind::PeriodDoubling));
-    for curve in &found.plane.curves {
-        assert_eq!((curve.of.n, curve.of.w), (1, 1));
+    for curve in found.plane.curves.iter().filter(turning) {
         assert_eq!(curve.ends, [End::Range; 2]);
     }
+    // At omega 2 the rotation is born at .4168 and doubles at 1.3469; the oscillation 2:0 breaks its symmetry at 1.2589.
+    let layers = pieces(&mut found, &request, &Control::default()).unwrap();
+    let stable = |p: f64, n: usize, w: i64, closure: Closure| {
+        let like = |layer: &&Layer| (layer.of.n, layer.of.w, layer.of.closure) == (n, w, closure);
+        let layer = layers.iter().find(like).unwrap();
+        let point = (p / 1.6 * SIDE as f64) as usize + SIDE * (SIDE / 2);
+        layer.pieces[layer.piece[point]].stable
+    };
+    let rotations = [0.3, 0.5, 1.3, 1.4].map(|p| stable(p, 1, 1, Closure::Whole));
+    assert_eq!(rotations, [Some(0), Some(1), Some(1), Some(0)]);
+    let oscillations = [1.2, 1.29].map(|p| stable(p, 2, 0, Closure::Half));
+    assert_eq!(oscillations, [Some(1), Some(0)]);
+    assert_eq!([1.2, 1.29].map(|p| stable(p, 2, 0, Closure::Whole)), [Some(0), Some(2)]);
+    assert!(
+        layers
+            .iter()
+            .all(|layer| layer.pieces.iter().all(|p| p.points < LEAST || p.stable.is_some()))
+    );
 }
 
 #[test]
@@ -163,7 +182,7 @@ fn a_branch_has_few_steps_where_motions_part_within_a_period() {
 #[test]
 fn without_damping_no_curve_lies_where_nothing_drives() {
     let base = Pendulum::new(0.0, 1.0, 2.0, 0.0, 0.0).unwrap();
-    let request = Request { longest: 1, only: Some(vec![(1, 0), (1, 1)]), threads: 1 };
+    let request = Request { longest: 1, threads: 1 };
     let law = |[low, high]: [f64; 2]| Law::Quadratic([low, high - low, 0.0]);
     let axes =
         vec![vec![(Parameter::P, law([0.0, 1.5]))], vec![(Parameter::Omega, law([1.5, 2.5]))]];

@@ -12,6 +12,7 @@ import xarray as xr
 
 from pendmap import _core
 from pendmap.analysis import backbone, curves, result, varied
+from pendmap.analysis import regions as in_plane
 from pendmap.analysis.result import Field, Schema, point, rows
 from pendmap.analysis.run import Numerics, RunOptions
 from pendmap.errors import (
@@ -74,6 +75,8 @@ def _branches(dataset: xr.Dataset) -> list[dict[str, Any]]:
 
 def regions(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the regions between events for the JSON object, with their stable orbits."""
+    if "region_part" in dataset:
+        return in_plane.entries(dataset)
     if "region_from" not in dataset:
         return []
     names = {"from": "region_from", "to": "region_to"}
@@ -209,7 +212,8 @@ def continuation(  # noqa: PLR0913 (physics first, numerical choices by name)
         pairs = {k: (*x[:2], _PLACES) if isinstance(x, tuple) else x for k, x in ranges.items()}
         axes = varied.varied(pendulum, pairs, 2)
         numerics = Numerics(RunOptions.of(run, options).in_memory("continuation"))
-        dataset, request = curves.in_plane(pendulum, axes, 4 if up_to is None else up_to, numerics)
+        up_to = 4 if up_to is None else up_to
+        dataset, request = curves.in_plane(pendulum, axes, up_to, numerics, counted=True)
         known = numerics.provenance() | request
         say, what = curves.summary, "curves are"
         varied.complete(SCHEMA, dataset, pendulum, axes, known, summary=say, what=what)
@@ -250,13 +254,17 @@ def _are_axes(ranges: Mapping[str, ArrayLike]) -> bool:
     return all(isinstance(values, tuple | Mapping) for values in ranges.values())
 
 
-def stable_orbits(dataset: xr.Dataset, value: float) -> list[dict[str, Any]]:
-    """Return the orbits that are stable at a value of the parameter.
+def stable_orbits(dataset: xr.Dataset, value: float | Mapping[str, float]) -> list[dict[str, Any]]:
+    """Return the orbits that are stable at a value of the parameter, or of both.
 
     ``dataset`` is a result of :func:`pendmap.continuation` with ``up_to``; orbits are known up to
     that period. Each has ``name``, ``n``, ``w`` and ``branch``; twins and both senses of a rotation
-    are there, what friction holds is not. Outside the range there are none.
+    are there, what friction holds is not. Outside the range there are none. In two parameters,
+    given as a mapping, each entry is a type of orbits with their number ``stable``, None where it
+    is not known.
     """
+    if isinstance(value, Mapping):
+        return in_plane.stable_orbits(dataset, value)
     inside = [one["stable"] for one in regions(dataset) if one["from"] <= value <= one["to"]]
     return inside[0] if inside else []
 

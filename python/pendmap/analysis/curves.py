@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from pendmap import _core
-from pendmap.analysis import result
+from pendmap.analysis import regions, result
 from pendmap.analysis.result import rows
 from pendmap.errors import InputError, check_whole, core_errors
 from pendmap.files.variables import flag, variable
@@ -65,7 +65,8 @@ def in_plane(
     axes: tuple[Varied, ...],
     longest: int,
     numerics: Numerics,
-    only: list[tuple[int, int]] | None = None,
+    *,
+    counted: bool = False,
 ) -> tuple[xr.Dataset, dict[str, Any]]:
     """Return the curves in the plane of two axes as variables, and what was asked."""
     bare, units = without_dimensions(pendulum)
@@ -76,8 +77,11 @@ def in_plane(
     first, second = ((x.tolist(), axis.kernel) for x, axis in zip(parts, axes, strict=True))
     with core_errors():
         run = numerics.run
-        raw = _core.bifurcation_set(bare, (first, second), longest, only, run.workers, run.progress)
-    dataset = xr.Dataset(variables(raw, axes, units))
+        raw = _core.bifurcation_set(
+            bare, (first, second), longest, counted, run.workers, run.progress
+        )
+    data = variables(raw, axes, units)
+    dataset = xr.Dataset(data | (regions.variables(raw, axes) if raw.types else {}))
     low, high = ([float(axis.values[end]) for axis in axes] for end in (0, -1))
     named = ", ".join(axis.name for axis in axes)
     asked = {"varied": named, "up_to": longest, "low": low, "high": high}

@@ -7,9 +7,9 @@ import math
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from pendmap._core import Attractor
+from pendmap.analysis.regions import smooth
 from pendmap.analysis.result import rows
 from pendmap.charts import names, palette, plane
 from pendmap.charts.chart import Axis, Chart, Panel, holding
@@ -41,7 +41,6 @@ _DASHES: Final[dict[str, Dash]] = {
     "period_doubling": DASHED,
     "symmetry_breaking": DOTTED,
 }
-_FINER: Final = 8  # Points of a line for each that was computed
 _EMPTY: Final[dict[str, Any]] = {"fill": "#ffffff", "edge": INK, "edge_width": 1.0}
 
 
@@ -179,7 +178,7 @@ def bifurcation_set(
         name, colour = _type_of(dataset, mine, n, w)
         types[name] = colour
         of: dict[str, Any] = {"colour": (colours or {}).get(kind, colour), "dash": _DASHES[kind]}
-        points, first = _smooth(places[mine])
+        points, first = smooth(places[mine])
         # Where new orbits change their side the coefficient has no sign.
         thin = (sides[mine] == 0)[first + changes[mine][first]]
         path = f"{name}/{kind}/{number}".replace(" ", "_").replace(":", "_")
@@ -200,16 +199,6 @@ def bifurcation_set(
     special = dataset["degenerate_kind"].values
     at_kind = ((one, degenerate[special == one]) for one in dict.fromkeys(special.tolist()))
     return [*marks, *lines, *(_events(kind, *at.T) for kind, at in at_kind)]
-
-
-def _smooth(points: Floats) -> tuple[Floats, Any]:
-    """Return a curve through points, with the number of the point before each of its own."""
-    pieces = np.linalg.norm(np.diff(points, axis=0) / np.ptp(points, axis=0).clip(1e-12), axis=1)
-    along = np.concatenate([[0.0], pieces.clip(1e-12).cumsum()])
-    part = np.linspace(0.0, along.size - 1, _FINER * (along.size - 1) + 1)
-    at = np.interp(part, np.arange(along.size), along)
-    first = np.minimum(part.astype(int), along.size - 2)
-    return PchipInterpolator(along, points)(at), first
 
 
 def _type_of(dataset: xr.Dataset, mine: Any, n: int, w: int) -> tuple[str, str]:  # noqa: ANN401
