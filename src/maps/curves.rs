@@ -121,8 +121,7 @@ impl Curves {
             let at = (0.5 + GOLDEN * k as f64).fract();
             let known = family.branches.len();
             let pendulum = family.pendulum(at);
-            let Request { longest, threads, .. } = *request;
-            let all = every_orbit(&pendulum, longest, f64::INFINITY, threads, control)?;
+            let all = every_orbit(&pendulum, request.longest, request.threads, control)?;
             for orbit in &all {
                 section.orbits += 1;
                 if !family.passes(orbit, at) {

@@ -2,7 +2,7 @@
 //!
 //! As [`super::orbits`], from one grid a period: the displacement is compared with all multiples of a turn. What is found has
 //! the precision of lanes, enough to be followed from. Where motions part so fast that the grid does not resolve them,
-//! Newton's method starts from cells spread evenly.
+//! Newton's method starts from the cells in which the displacement is nearest to a linear function.
 
 use std::f64::consts::{PI, TAU};
 
@@ -35,15 +35,13 @@ const ANY_TURNS: [i64; 2] = [-1_000_000, 1_000_000];
 /// A start this near to an orbit leads to it.
 const KNOWN: f64 = 1e-3;
 
-/// Orbits with smallest periods up to `longest`; of mirror images one, where the mirrored motion needs no time. Those alone
-/// whose multipliers have a sum of about `steepest` at most; one of stable orbits is below 2.
+/// Orbits with smallest periods up to `longest`; of mirror images one, where the mirrored motion needs no time.
 ///
 /// # Errors
 /// The errors of [`super::orbits::orbits`].
 pub fn every_orbit(
     pendulum: &Pendulum,
     longest: usize,
-    steepest: f64,
     threads: usize,
     control: &Control,
 ) -> Result<Vec<PeriodicOrbit>, Error> {
@@ -74,12 +72,11 @@ pub fn every_orbit(
             Ok(from.iter().zip(ends.iter().zip(turns)).map(gap).collect())
         };
         let axes = grid(n)?;
-        let places = places(axes, ANY_TURNS, MOST, steepest, &displacement)?;
-        let spread: Vec<(State, i64)> =
-            places.iter().step_by(places.len() / MOST + 1).copied().collect();
+        let mut places = places(axes, ANY_TURNS, MOST, &displacement)?;
+        places.truncate(MOST);
         let cell = TAU / axes[0].count as f64;
         let far = LEAST_REACH.max(REACH * cell);
-        let near = approach(&spread, far, steepest, displacement)?;
+        let near = approach(&places, far, displacement)?;
         let known = |state: &State| all.iter().any(|orbit| orbit.contains(*state, KNOWN));
         let starts: Vec<(State, usize)> =
             near.into_iter().filter(|state| !known(state)).map(|state| (state, n)).collect();

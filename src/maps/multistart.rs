@@ -4,8 +4,7 @@
 //! multiplied by `1 / J`: at a zero, at `x` from the centre in cells, `x + J^-1 F(0)` is the negative of the
 //! nonlinear part. The nonlinear part is estimated on the nodes of the cell and the ring of cells about it, an area
 //! nine times the cell, on which the quadratic part is nine times larger too. A cell is dropped if this estimate
-//! excludes a zero in it, or if all slopes there have traces that are not asked for; the other cells are quartered and
-//! tested again.
+//! excludes a zero in it; the other cells are quartered and tested again.
 //!
 //! [`approach`] then takes steps of Newton's method by finite differences from many places at once.
 
@@ -50,11 +49,12 @@ struct Cell {
     aim: State,
     /// The turns that the field has there.
     turns: i64,
+    /// The nonlinear part on the ring, in cells; infinite where it is not known.
+    bend: f64,
 }
 
 /// Points from which Newton's method should find all places in the box at which the field is a number of turns from the
-/// least to the most, in its first component; with this number. The trace of the slope is at most `steepest` on either
-/// side of -2.
+/// least to the most, in its first component; with this number. Those where the field is nearly linear come first.
 ///
 /// # Errors
 /// Errors of `field`, which is evaluated at many points at once.
@@ -62,7 +62,6 @@ pub(super) fn places(
     axes: [Axis; 2],
     turns: [i64; 2],
     most: usize,
-    steepest: f64,
     mut field: impl FnMut(&[State]) -> Result<Vec<State>, Error>,
 ) -> Result<Vec<(State, i64)>, Error> {
     let [theta, velocity] = axes;
@@ -80,7 +79,7 @@ pub(super) fn places(
         for i in 0..theta.count {
             let patch = |k: usize| values[(j + k / 4) * columns + i + k % 4];
             let corner = nodes[(j + 1) * columns + i + 1];
-            cells.extend(judged(corner, size, steepest, turns, &std::array::from_fn(patch)));
+            cells.extend(judged(corner, size, turns, &std::array::from_fn(patch)));
         }
     }
     for _ in 0..LEVELS {
@@ -104,12 +103,13 @@ pub(super) fn places(
                 let (i, j) = (quarter % 2, quarter / 2);
                 let patch = |k: usize| values[(j + k / 4) * 5 + i + k % 4];
                 let corner = nodes[(j + 1) * 5 + i + 1];
-                let (turns, patch) = ([cell.turns; 2], std::array::from_fn(patch));
-                smaller.extend(judged(corner, half, steepest, turns, &patch));
+                let turns = [cell.turns; 2];
+                smaller.extend(judged(corner, half, turns, &std::array::from_fn(patch)));
             }
         }
         (cells, size) = (smaller, half);
     }
+    cells.sort_by(|a, b| a.bend.total_cmp(&b.bend));
     Ok(cells.iter().map(|cell| (cell.aim, cell.turns)).collect())
 }
 
@@ -117,7 +117,6 @@ pub(super) fn places(
 fn judged(
     corner: State,
     size: [f64; 2],
-    steepest: f64,
     [least, most]: [i64; 2],
     patch: &Patch,
 ) -> impl Iterator<Item = Cell> {
@@ -130,12 +129,13 @@ fn judged(
     let [from, to] = [((low - spare) / TAU).ceil() as i64, ((high + spare) / TAU).floor() as i64];
     let shifted = move |turns: i64| patch.map(|[a, b]| [a - TAU * turns as f64, b]);
     (from.max(least)..=to.min(most)).filter_map(move |turns| {
-        judge(corner, size, steepest, &shifted(turns)).map(|aim| Cell { corner, aim, turns })
+        let (aim, bend) = judge(corner, size, &shifted(turns))?;
+        Some(Cell { corner, aim, turns, bend })
     })
 }
 
-/// The zero of the linear part, if the field may vanish in the cell, with such a slope.
-fn judge(corner: State, size: [f64; 2], steepest: f64, patch: &Patch) -> Option<State> {
+/// The zero of the linear part and the nonlinear part, if the field may vanish in the cell.
+fn judge(corner: State, size: [f64; 2], patch: &Patch) -> Option<(State, f64)> {
     let [mut low, mut high] = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
     for value in patch.iter().flatten().zip([0, 1].into_iter().cycle()) {
         let (value, k) = value;
@@ -154,7 +154,7 @@ fn judge(corner: State, size: [f64; 2], steepest: f64, patch: &Patch) -> Option<
     let mean = 0.25 * (value(5) + value(6) + value(9) + value(10));
     let along = 0.5 * (value(6) + value(10) - value(5) - value(9));
     let up = 0.5 * (value(9) + value(10) - value(5) - value(6));
-    let unresolved = Some(centre);
+    let unresolved = Some((centre, f64::INFINITY));
     let Some(inverse) = Matrix2::from_columns(&[along, up]).try_inverse() else {
         return unresolved;
     };
@@ -172,14 +172,8 @@ fn judge(corner: State, size: [f64; 2], steepest: f64, patch: &Patch) -> Option<
     if !bend.is_finite() {
         return unresolved;
     }
-    // Slopes of the nonlinear part, which is quadratic, are about half of what it is on the ring.
-    let slopes = [along / size[0], up / size[1]];
-    let change = 0.5 * bend * (slopes[0].abs().sum() + slopes[1].abs().sum());
-    if (slopes[0][0] + slopes[1][1] + 2.0).abs() - change > steepest {
-        return None;
-    }
     // At most to the cell's edge: the linear part is unknown beyond.
-    Some([0, 1].map(|k| centre[k] - from_centre[k].clamp(-1.0, 1.0) * size[k]))
+    Some(([0, 1].map(|k| centre[k] - from_centre[k].clamp(-1.0, 1.0) * size[k]), bend))
 }
 
 /// A start during the iteration.
@@ -192,15 +186,13 @@ struct Iteration {
     begun_at: f64,
 }
 
-/// The points that the starts reach within `reach` near places at which the field is their number of turns, each once;
-/// those alone at which the trace of its slope is at most `steepest` on either side of -2.
+/// The points that the starts reach within `reach` near places at which the field is their number of turns, each once.
 ///
 /// # Errors
 /// Errors of `field`, which is evaluated at many points at once.
 pub(super) fn approach(
     starts: &[(State, i64)],
     reach: f64,
-    steepest: f64,
     mut field: impl FnMut(&[State]) -> Result<Vec<State>, Error>,
 ) -> Result<Vec<State>, Error> {
     let begun = |(start, turns): &(State, i64)| Iteration {
@@ -236,16 +228,14 @@ pub(super) fn approach(
             if size < w.least {
                 (w.least, w.best) = (size, w.point);
             }
-            let slope = Matrix2::from_columns(&[right - at, above - at]) / DIFFERENCE;
             if size < NEAR {
-                if (slope.trace() + 2.0).abs() <= steepest {
-                    arrived.push(w.point);
-                }
+                arrived.push(w.point);
                 continue;
             }
             if !size.is_finite() || iteration == PROMISING && w.least > 0.1 * w.begun_at {
                 continue;
             }
+            let slope = Matrix2::from_columns(&[right - at, above - at]) / DIFFERENCE;
             let Some(step) = slope.lu().solve(&-at) else { continue };
             let damped = (LONGEST_STEP / step.norm()).min(1.0);
             w.point = [w.point[0] + damped * step[0], w.point[1] + damped * step[1]];

@@ -217,9 +217,8 @@ fn beginnings(
         };
         Ok(from.iter().zip(ends).map(gap).collect())
     };
-    let axes = [request.theta, request.velocity];
-    let places = places(axes, request.w, MOST_CELLS, f64::INFINITY, &displacements)?;
-    approach(&places, reach, f64::INFINITY, displacements)
+    let places = places([request.theta, request.velocity], request.w, MOST_CELLS, &displacements)?;
+    approach(&places, reach, displacements)
 }
 
 /// Starts near an orbit whose displacement over `n` periods is almost constant in one direction:

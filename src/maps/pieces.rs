@@ -27,8 +27,6 @@ const FINE: f64 = 0.25;
 pub const LEAST: usize = 16;
 /// Rounds of adding curves at most.
 const ROUNDS: usize = 6;
-/// Sum of the multipliers of orbits that are searched, at most: those of stable ones have less than 2.
-const STEEPEST: f64 = 4.0;
 
 /// The pieces of one type.
 #[derive(Clone, Debug)]
@@ -160,7 +158,7 @@ fn stable(
     let family = section(plane, held)?;
     let mirrored = plane.symmetry == Some(Symmetry::AtOnce);
     let pendulum = family.pendulum(at);
-    let all = every_orbit(&pendulum, plane.longest, STEEPEST, request.threads, control)?;
+    let all = every_orbit(&pendulum, plane.longest, request.threads, control)?;
     let typed = |orbit: PeriodicOrbit| {
         let (mut of, _) = family.type_of(&orbit, at)?;
         if mirrored {

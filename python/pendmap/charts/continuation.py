@@ -13,8 +13,9 @@ from pendmap.analysis.regions import smooth
 from pendmap.analysis.result import rows
 from pendmap.charts import names, palette, plane
 from pendmap.charts.chart import Axis, Chart, Panel, holding
-from pendmap.charts.marks import DASHED, DOTTED, INK, NONE, QUIET, Line, Mark, Points
+from pendmap.charts.marks import DASHED, DOTTED, INK, NONE, QUIET, Image, Line, Mark, Points
 from pendmap.files import facts
+from pendmap.formatting import counted
 from pendmap.units import Units
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-    from pendmap.charts.marks import Dash, Floats
+    from pendmap.charts.marks import Dash, Ends, Floats
 
 _COLOURS: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
 _UNSTABLE: Final = {"colour": "#555555", "width": 0.7, "name": "unstable"}
@@ -41,6 +42,7 @@ _DASHES: Final[dict[str, Dash]] = {
     "period_doubling": DASHED,
     "symmetry_breaking": DOTTED,
 }
+_SHADES: Final = ("#ffffff", "#f0f0f0", "#e2e2e2", "#d4d4d4", "#c6c6c6")  # By stable orbits
 _EMPTY: Final[dict[str, Any]] = {"fill": "#ffffff", "edge": INK, "edge_width": 1.0}
 
 
@@ -57,7 +59,8 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
         of = (str(dataset[f"place_{one}"].attrs.get("units", "1")) for one in both)
         triples = zip(both, of, ends, strict=True)
         across, up = (Axis(names.symbol(one, unit), pair) for one, unit, pair in triples)
-        panel = Panel("curves", "", across, up, bifurcation_set(dataset, both))
+        marks = [*_stable(dataset, across.ends, up.ends), *bifurcation_set(dataset, both)]
+        panel = Panel("curves", "", across, up, marks)
         title = f"Bifurcations of orbits up to {a['up_to']} periods over {names.over(both)}"
         return Chart(title, names.parameters(a, both), [[panel]], size=(7.4, 5.6)).only(layer)
     units = Units.of(a)
@@ -146,6 +149,16 @@ def _backbones(dataset: xr.Dataset) -> list[Mark]:
         Line(rate * n / k, height, path=f"backbone/{n}/{k}", name="" if i else "backbone", **look)
         for i, (n, k) in enumerate(types)
     ]
+
+
+def _stable(dataset: xr.Dataset, x: Ends, y: Ends) -> list[Mark]:
+    """Return how many orbits are stable over the plane, in shades of grey."""
+    if "stable_count" not in dataset:
+        return []
+    counts = dataset["stable_count"].values.clip(0).sum(axis=0).clip(0, len(_SHADES) - 1)
+    texts = ["no stable orbit", *(counted(k, "stable orbit") for k in range(1, len(_SHADES)))]
+    texts[-1] += " or more"
+    return [Image(counts, x, y, classes=list(zip(texts, _SHADES, strict=True)))]
 
 
 def bifurcation_set(
