@@ -163,28 +163,21 @@ def continuation(  # noqa: PLR0913 (physics first, numerical choices by name)
     Returns
     -------
     xarray.Dataset
-        Branches over ``branch``: ``branch_n``, ``branch_w``, ``branch_kind``,
-        ``branch_symmetric``, ``branch_begin`` and ``branch_end`` (why it ends), ``branch_first``
-        and ``branch_last`` (the values there), ``branch_low`` and ``branch_high``,
-        ``branch_begin_event`` and ``branch_end_event`` (the event that it meets another branch at),
-        ``branch_twin``. Their orbits over ``orbit``: ``orbit_value``, ``orbit_branch``,
-        ``orbit_multipliers``, ``orbit_stable``, ``orbit_phases`` (under friction: + - slips, 0
-        sticks), ``orbit_amplitude`` (half the angle between its outermost turns; nan of rotations),
-        ``orbit_swings``; all points over ``point``. Along a frequency, the ``backbone_amplitude``
-        of free swings over ``backbone_value``, their rate: orbits of ``k`` swings in ``n`` periods
-        lie near ``n/k`` times it. Events over ``event``: ``event_kind``, ``event_value``,
-        ``event_theta``, ``event_velocity``,
-        ``event_n``, ``event_w``, ``event_multipliers``, ``event_supercritical``, ``event_smooth``,
-        ``event_branch``, ``event_orbit``. Sections searched over ``section``. With ``up_to``, the
-        regions in which the same orbits up to that period are stable, over ``region``:
-        ``region_from``, ``region_to``; these orbits over ``stable``: ``stable_region``,
-        ``stable_branch``. What friction holds is not among them.
+        Variables begin with their dimension, like ``branch_n``. ``branch``: ``n``, ``w``, ``kind``,
+        ``symmetric``, ``twin``, ``begin`` and ``end`` (why it ends), ``begin_event``, ``end_event``
+        (where it meets another branch), ``first``, ``last``, ``low``, ``high``. ``orbit``:
+        ``branch``, ``value``, ``multipliers``, ``stable``, ``phases`` (under friction: + - slips, 0
+        sticks), ``amplitude`` (half the angle between its outermost turns; nan of rotations),
+        ``swings``. ``point``: ``orbit``, ``theta``, ``velocity``. ``event``: ``kind``, ``value``,
+        ``theta``, ``velocity``, ``n``, ``w``, ``multipliers``, ``supercritical``, ``smooth``,
+        ``branch``, ``orbit``. ``section``: where orbits were searched. With ``up_to`` the ``from``
+        and ``to`` of each ``region`` in which the same orbits up to that period are ``stable``,
+        without what friction holds. Along a frequency, ``backbone_amplitude`` of free swings over
+        their rate ``backbone_value``: ``k`` swings in ``n`` periods lie near ``n/k`` times it.
 
-        Of two parameters, curves over ``curve``: ``curve_kind``, ``curve_n``, ``curve_w``,
-        ``curve_symmetric``, ``curve_begin``, ``curve_end``; their points over ``place``:
-        ``place_curve``, ``place_theta``, ``place_velocity``, ``place_multipliers``,
-        ``place_supercritical``, and ``place_p`` and others of the parameters; points of
-        codimension 2 over ``degenerate``: ``degenerate_kind``, ``degenerate_n`` and so on.
+        Of two parameters, ``curve``: ``kind``, ``n``, ``w``, ``symmetric``, ``begin``, ``end``;
+        their ``place``: ``curve``, ``theta``, ``velocity``, ``multipliers``, ``supercritical`` and
+        both parameters; points of codimension 2, ``degenerate``: ``kind``, ``n`` and so on.
 
     Raises
     ------
