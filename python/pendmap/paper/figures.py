@@ -54,8 +54,8 @@ PRINTED: Final = {
 }
 """The paper's table 1, percent: periods of 0.26 s and 1.54 s, peaks of 1.2 rad and 2.53 rad."""
 _PRINTED_HEAD: Final = ("period 0.26 s", "period 1.54 s", "peak 1.2 rad", "peak 2.53 rad")
-_SQUARES: Final = (0.15, 1.6)  # Range of alpha^2 of figure 1
-_HIGHEST: Final = 2.6  # Largest e of figure 1
+_SQUARES: Final = (0.05, 1.6)  # Range of alpha^2 of figure 1
+_HIGHEST: Final = 18.0  # Largest p of figure 1; no curve of its plane lies above
 _COLUMNS: Final = 120  # Number of frequencies of figure 1
 
 
@@ -158,7 +158,7 @@ def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
     if key == "1":
         marks = [(one.p, one.omega, name[-1]) for name, one in sorted(PRESETS.items())]
         omega = 1 / np.sqrt(np.linspace(*_SQUARES, _COLUMNS)[::-1])
-        rests = pendmap.tongues(PRESETS["fig2a"], omega, _HIGHEST / _SQUARES[0])
+        rests = pendmap.tongues(PRESETS["fig2a"], omega, _HIGHEST)
         return render.draw(tongues.chart(rests, layer="e-alpha2", title=title, marks=marks), path)
     if key == "2":
         return render.draw(tumbling_chart(tumbling(), title), path)
