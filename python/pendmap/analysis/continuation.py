@@ -39,8 +39,8 @@ if TYPE_CHECKING:
 
 LONGEST: Final = 64  # Longest period of an orbit, in forcing periods
 MOST: Final = 16  # Longest period up to which all orbits are followed
+_LISTED: Final = curves.LISTED  # Largest number of events in a summary
 _PLACES: Final = 33  # Values along a range, from which the core knows how parameters depend on it
-_LISTED: Final = 16  # Largest number of events in a summary
 
 
 def events(dataset: xr.Dataset) -> list[dict[str, Any]]:
@@ -152,8 +152,8 @@ def continuation(  # noqa: PLR0913 (physics first, numerical choices by name)
         Angle and velocity from which Newton's method finds the one orbit that is followed, at the
         model's own value of the parameter; by default all orbits are searched.
     up_to : int, optional
-        Longest period of the orbits, in forcing periods; 1 to 16: all types are followed, instead
-        of one, with the mirror images of rotations. With two parameters by default 4.
+        Longest period of the orbits, in forcing periods; 1 to 16, with two parameters by default 4:
+        all types are followed, instead of one, with the mirror images of rotations.
     longest : int, optional
         Longest period of the branches that are begun at doublings, in forcing periods; by default
         32, or ``up_to``.
@@ -198,6 +198,8 @@ def continuation(  # noqa: PLR0913 (physics first, numerical choices by name)
     (['period_doubling', 'fold'], array([1.34685852, 0.41678757]))
     """
     if isinstance(ranges, Mapping) and len(ranges) == 2 and _are_axes(ranges):  # noqa: PLR2004
+        if (n, w, start, longest) != (None,) * 4:
+            raise InputError("n, w, start and longest must not be given with two parameters")
         pendulum = varied.having(pendulum, ranges)
         pairs = {k: (*x[:2], _PLACES) if isinstance(x, tuple) else x for k, x in ranges.items()}
         axes = varied.varied(pendulum, pairs, 2)
@@ -219,7 +221,7 @@ def continuation(  # noqa: PLR0913 (physics first, numerical choices by name)
         if (n, w, start) != (None, None, None):
             raise InputError("n, w and start must not be given with up_to")
         asked["up_to"] = n = check_whole("up_to", up_to, 1, MOST)
-    longest = check_whole("longest", longest or up_to or 32, 1, LONGEST)
+    longest = check_whole("longest", (up_to or 32) if longest is None else longest, 1, LONGEST)
     numerics = Numerics(RunOptions.of(run, options).in_memory("continuation"))
     begun = None if start is None else [_start(pendulum, axis, start, n, units)]
     with core_errors():
@@ -261,8 +263,8 @@ def _with_count(ranges: Mapping[str, ArrayLike]) -> Mapping[str, ArrayLike]:
     got = {k: one[:2] for k, one in ends.items()} or "nothing"
     if not pairs or len(ends) > 1 or any(one[0] == one[1] for one in ends.values()):
         raise InputError(
-            "one parameter must vary over a range of two values, like {'p': (0.3, 1.6)}, or on the"
-            f" command line --vary p 0.3:1.6; got {got}"
+            "one parameter, or two, must vary over a range of two values, as {'p': (0.3, 1.6)}, on"
+            f" the command line --vary p 0.3:1.6; got {got}"
         )
     return pairs | {k: (*one[:2], _PLACES) for k, one in ends.items()}
 
