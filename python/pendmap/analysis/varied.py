@@ -280,7 +280,7 @@ def _one(model: Pendulum | Rig, name: str, values: Floats) -> Varied:
     if name not in conversions and name not in shared:
         raise InputError(
             f"{short_repr(name)} is no parameter of this model: it must be one of "
-            f"{', '.join([*conversions, *shared])}, or EFFECT.PARAMETER of an effect that it has"
+            f"{', '.join([*conversions, *shared])}, or EFFECT.PARAMETER as pendmap effects lists"
         )
     if name in conversions:
         bare, factor, power = conversions[name]

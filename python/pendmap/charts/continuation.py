@@ -137,8 +137,11 @@ def _moving(
     x, stable = points["value"], points["stable"]
     low, high = np.sort([x[:-1], x[1:]], axis=0)
     crossed = (low <= steps[:, None]) & (steps[:, None] <= high) & (low < high)
-    step, at = np.nonzero(crossed & (np.diff(points["line"]) == 0))
-    when, part = steps[step], (steps[step] - x[at]) / (x[at + 1] - x[at])
+    new = np.diff(points["line"], append=-1) != 0
+    step, at = np.nonzero(crossed & ~new[:-1])
+    part = (steps[step] - x[at]) / (x[at + 1] - x[at])
+    once = (part < 1) | new[at + 1]  # a point where two pieces meet
+    step, at, part = step[once], at[once], part[once]
     places = {}
     for name in {*points} & {"value", "across", "amplitude", *_SIDES}:
         gap = points[name][at + 1] - points[name][at]
@@ -150,7 +153,7 @@ def _moving(
         mine = (points["type"][at] == name) & ((stable[at] & stable[at + 1]) == way)
         path = re.sub(r"\W", "_", name) + "/unstable" * (not way)
         look: dict[str, Any] = {"colour": colours[name], "path": f"now/{path}"}
-        look |= {"size": 9.0, "when": when[mine]} if way else {"size": 5.0, "when": when[mine]}
+        look |= {"size": 9.0 if way else 5.0, "when": steps[step[mine]]}
         for panel, sides in _MOVING.items() if mine.any() else ():
             if sides[0] in places and sides[1] in places:
                 marks[panel].append(Points(*(places[side][mine] for side in sides), **look))
