@@ -1,4 +1,4 @@
-"""Events of ``pendmap continue`` against heyoka, and its time beside a continuation by scipy.
+"""Events of ``pendmap continue`` against heyoka.
 
 Pendulums, drives and parameters that vary are drawn at random. Every fold, doubling and symmetry
 breaking that `continue` locates is the start of Newton's method on ``P^n(x) = x`` and
@@ -9,13 +9,11 @@ from __future__ import annotations
 
 import argparse
 import math
-import time
 from collections import defaultdict
 
 import heyoka as hy  # type: ignore[import-untyped]
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import solve_ivp  # type: ignore[import-untyped]
 
 import pendmap
 from benchmarks.peers.report import machine, note, say, table
@@ -27,10 +25,8 @@ MULTIPLIERS = {"fold": 1, "period_doubling": -1, "symmetry_breaking": -1}
 """Critical multiplier of the map that closes; of symmetric orbits the half map with a mirror."""
 TYPES = ((1, 0), (2, 0), (1, 1), (2, 1))
 ITERATIONS = 10
-ARC = 0.02
 MIRRORED = 1e-6
 EVENT = ("kind", "value", "theta", "velocity", "n", "w")
-LOW, HIGH = 0.3, 1.6
 
 
 class Heyoka:
@@ -99,45 +95,13 @@ class Heyoka:
         return float(values[varied])
 
 
-def by_scipy(model: pendmap.Pendulum, start: tuple[float, float]) -> tuple[float, int]:
-    """Follow the rotation 1:1 along p by pseudo-arclength; return seconds of CPU and the steps."""
-
-    def gap(z: Floats) -> tuple[Floats, Floats]:
-        def rhs(tau: float, y: Floats) -> Floats:
-            pull = 1 + z[2] * math.cos(model.omega * tau)
-            by = np.array([[0, 1], [-pull * math.cos(y[0]), -model.gamma]])
-            force = [y[1], -model.gamma * y[1] - pull * math.sin(y[0])]
-            slopes = by @ y[2:].reshape(2, 3)
-            slopes[1, 2] -= math.cos(model.omega * tau) * math.sin(y[0])
-            return np.concatenate([force, slopes.ravel()])
-
-        first = [z[0], z[1], 1, 0, 0, 0, 1, 0]
-        run = solve_ivp(rhs, (0, model.period), first, "DOP853", rtol=1e-12, atol=1e-13)
-        end = run.y[:, -1]
-        turned = end[:2] - z[:2] - np.array([2 * math.pi, 0])
-        return turned, end[2:].reshape(2, 3) - np.eye(2, 3)
-
-    begun, z, steps = time.process_time(), np.array([*start, model.p]), 0
-    along = np.array([0.0, 0.0, -1.0])
-    while LOW <= z[2] <= HIGH:
-        guess = z + ARC * along
-        for _ in range(6):
-            turned, by = gap(guess)
-            step = np.linalg.solve(np.vstack([by, along]), [*turned, along @ (guess - z) - ARC])
-            guess = guess - step
-        _, by = gap(guess)
-        way = np.cross(*by)
-        along, z, steps = way / np.linalg.norm(way) * np.sign(way @ along), guess, steps + 1
-    return time.process_time() - begun, steps
-
-
 def main() -> None:
-    """Print both tables."""
+    """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=20, help="pendulums drawn")
     parser.add_argument("--seed", type=int, default=1)
     asked = parser.parse_args()
-    say(machine(["pendmap", "heyoka", "scipy"]))
+    say(machine(["pendmap", "heyoka"]))
     draw, flow = np.random.default_rng(asked.seed), Heyoka()
     names = list(RANGES)
     differences: dict[str, list[float]] = defaultdict(list)
@@ -159,21 +123,6 @@ def main() -> None:
         for kind, away in sorted(differences.items())
     ]
     say(table(["event", "number", "median difference from heyoka", "greatest"], rows))
-
-    model = pendmap.Pendulum(gamma=0.1, omega=2.0, p=1.0)
-    begun = time.process_time()
-    result = pendmap.continuation(model, {"p": (LOW, HIGH)}, n=1, w=1, threads=1)
-    ours = time.process_time() - begun
-    points = pendmap.orbit(model, n=1, w=1)
-    stable = int(np.argmax(points["stable"].values))
-    start = (float(points["theta_point"][stable]), float(points["velocity_point"][stable]))
-    theirs, steps = by_scipy(model, start)
-    say(
-        f"branch of 1:1 over p .3 to 1.6, search and events: {ours:.3f} s of one core, "
-        f"{result.sizes['orbit']} orbits\n"
-        f"half of it by scipy, pseudo-arclength from a start: {theirs:.2f} s, {steps} steps, "
-        f"{theirs / ours:.0f} times as long"
-    )
 
 
 if __name__ == "__main__":

@@ -329,9 +329,7 @@ class Survey:
     def gained(self, pass_number: int, block: int, found: bytes) -> bool: ...
     def result(self, blocks: Sequence[bytes]) -> ParameterMap: ...
     def diagram(
-        self,
-        blocks: Sequence[bytes],
-        first: tuple[float, float] | None = None,
+        self, blocks: Sequence[bytes], first: tuple[float, float] | None = None
     ) -> Bifurcation: ...
 
 @final

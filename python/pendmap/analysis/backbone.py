@@ -144,10 +144,7 @@ def backbone(pendulum: Pendulum | Rig, *, energy_max: float = 6.0, count: int = 
             "motion_period": variable("motion", period, units.of_time, "period"),
             "motion_rate": variable("motion", rate, units.of_velocity, "2 pi over the period"),
             "motion_velocity": variable(
-                "motion",
-                units.given(velocity, VELOCITY),
-                units.of_velocity,
-                "greatest velocity",
+                "motion", units.given(velocity, VELOCITY), units.of_velocity, "greatest velocity"
             ),
         }
     )

@@ -239,12 +239,7 @@ class BasinTiles:
         return cells
 
     def _whole(
-        self,
-        plan: _core.BasinPlan,
-        store: Store,
-        moves: list[Labels],
-        *,
-        check: bool,
+        self, plan: _core.BasinPlan, store: Store, moves: list[Labels], *, check: bool
     ) -> SimpleNamespace:
         """Return what the whole map tells."""
         rows, row = self.starts.shape[0], self.starts.row

@@ -40,8 +40,8 @@ if TYPE_CHECKING:
 
 LONGEST: Final = 64  # Longest period of an orbit, in forcing periods
 MOST: Final = 16  # Longest period up to which all orbits are followed
+_LISTED: Final = curves.LISTED  # Largest number of events in a summary
 _PLACES: Final = 33  # Values along a range, from which the core knows how parameters depend on it
-_LISTED: Final = 16  # Largest number of events in a summary
 
 
 def events(dataset: xr.Dataset) -> list[dict[str, Any]]:
@@ -155,8 +155,8 @@ def continuation(  # noqa: PLR0913 (physics first, numerical choices by name)
         Angle and velocity from which Newton's method finds the one orbit that is followed, at the
         model's own value of the parameter; by default all orbits are searched.
     up_to : int, optional
-        Longest period of the orbits, in forcing periods; 1 to 16: all types are followed, instead
-        of one, with the mirror images of rotations. With two parameters by default 4.
+        Longest period of the orbits, in forcing periods; 1 to 16, with two parameters by default 4:
+        all types are followed, instead of one, with the mirror images of rotations.
     longest : int, optional
         Longest period of the branches that are begun at doublings, in forcing periods; by default
         32, or ``up_to``.
@@ -166,28 +166,21 @@ def continuation(  # noqa: PLR0913 (physics first, numerical choices by name)
     Returns
     -------
     xarray.Dataset
-        Branches over ``branch``: ``branch_n``, ``branch_w``, ``branch_kind``,
-        ``branch_symmetric``, ``branch_begin`` and ``branch_end`` (why it ends), ``branch_first``
-        and ``branch_last`` (the values there), ``branch_low`` and ``branch_high``,
-        ``branch_begin_event`` and ``branch_end_event`` (the event that it meets another branch at),
-        ``branch_twin``. Their orbits over ``orbit``: ``orbit_value``, ``orbit_branch``,
-        ``orbit_multipliers``, ``orbit_stable``, ``orbit_phases`` (under friction: + - slips, 0
-        sticks), ``orbit_amplitude`` (half the angle between its outermost turns; nan of rotations),
-        ``orbit_swings``; all points over ``point``. Along a frequency, the ``backbone_amplitude``
-        of free swings over ``backbone_value``, their rate: orbits of ``k`` swings in ``n`` periods
-        lie near ``n/k`` times it. Events over ``event``: ``event_kind``, ``event_value``,
-        ``event_theta``, ``event_velocity``,
-        ``event_n``, ``event_w``, ``event_multipliers``, ``event_supercritical``, ``event_smooth``,
-        ``event_branch``, ``event_orbit``. Sections searched over ``section``. With ``up_to``, the
-        regions in which the same orbits up to that period are stable, over ``region``:
-        ``region_from``, ``region_to``; these orbits over ``stable``: ``stable_region``,
-        ``stable_branch``. What friction holds is not among them.
+        Variables begin with their dimension, like ``branch_n``. ``branch``: ``n``, ``w``, ``kind``,
+        ``symmetric``, ``twin``, ``begin`` and ``end`` (why it ends), ``begin_event``, ``end_event``
+        (where it meets another branch), ``first``, ``last``, ``low``, ``high``. ``orbit``:
+        ``branch``, ``value``, ``multipliers``, ``stable``, ``phases`` (under friction: + - slips, 0
+        sticks), ``amplitude`` (half the angle between its outermost turns; nan of rotations),
+        ``swings``. ``point``: ``orbit``, ``theta``, ``velocity``. ``event``: ``kind``, ``value``,
+        ``theta``, ``velocity``, ``n``, ``w``, ``multipliers``, ``supercritical``, ``smooth``,
+        ``branch``, ``orbit``. ``section``: where orbits were searched. With ``up_to`` the ``from``
+        and ``to`` of each ``region`` in which the same orbits up to that period are ``stable``,
+        without what friction holds. Along a frequency, ``backbone_amplitude`` of free swings over
+        their rate ``backbone_value``: ``k`` swings in ``n`` periods lie near ``n/k`` times it.
 
-        Of two parameters, curves over ``curve``: ``curve_kind``, ``curve_n``, ``curve_w``,
-        ``curve_symmetric``, ``curve_begin``, ``curve_end``; their points over ``place``:
-        ``place_curve``, ``place_theta``, ``place_velocity``, ``place_multipliers``,
-        ``place_supercritical``, and ``place_p`` and others of the parameters; points of
-        codimension 2 over ``degenerate``: ``degenerate_kind``, ``degenerate_n`` and so on.
+        Of two parameters, ``curve``: ``kind``, ``n``, ``w``, ``symmetric``, ``begin``, ``end``;
+        their ``place``: ``curve``, ``theta``, ``velocity``, ``multipliers``, ``supercritical`` and
+        both parameters; points of codimension 2, ``degenerate``: ``kind``, ``n`` and so on.
 
     Raises
     ------
@@ -208,6 +201,8 @@ def continuation(  # noqa: PLR0913 (physics first, numerical choices by name)
     (['period_doubling', 'fold'], array([1.34685852, 0.41678757]))
     """
     if isinstance(ranges, Mapping) and len(ranges) == 2 and _are_axes(ranges):  # noqa: PLR2004
+        if (n, w, start, longest) != (None,) * 4:
+            raise InputError("n, w, start and longest must not be given with two parameters")
         pendulum = varied.having(pendulum, ranges)
         pairs = {k: (*x[:2], _PLACES) if isinstance(x, tuple) else x for k, x in ranges.items()}
         axes = varied.varied(pendulum, pairs, 2)
@@ -230,7 +225,7 @@ def continuation(  # noqa: PLR0913 (physics first, numerical choices by name)
         if (n, w, start) != (None, None, None):
             raise InputError("n, w and start must not be given with up_to")
         asked["up_to"] = n = check_whole("up_to", up_to, 1, MOST)
-    longest = check_whole("longest", longest or up_to or 32, 1, LONGEST)
+    longest = check_whole("longest", (up_to or 32) if longest is None else longest, 1, LONGEST)
     numerics = Numerics(RunOptions.of(run, options).in_memory("continuation"))
     begun = None if start is None else [_start(pendulum, axis, start, n, units)]
     with core_errors():
@@ -276,8 +271,8 @@ def _with_count(ranges: Mapping[str, ArrayLike]) -> Mapping[str, ArrayLike]:
     got = {k: one[:2] for k, one in ends.items()} or "nothing"
     if not pairs or len(ends) > 1 or any(one[0] == one[1] for one in ends.values()):
         raise InputError(
-            "one parameter must vary over a range of two values, like {'p': (0.3, 1.6)}, or on the"
-            f" command line --vary p 0.3:1.6; got {got}"
+            "one parameter, or two, must vary over a range of two values, as {'p': (0.3, 1.6)}, on"
+            f" the command line --vary p 0.3:1.6; got {got}"
         )
     return pairs | {k: (*one[:2], _PLACES) for k, one in ends.items()}
 

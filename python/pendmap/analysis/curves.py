@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from pendmap.units import Units
 
 LONGEST = 16  # Longest period of orbits whose curves are followed, in forcing periods
+LISTED = 16  # Largest number of points in a summary
 CRITICALITY = {-1: "no meaning", 0: "subcritical", 1: "supercritical"}
 
 
@@ -172,4 +173,5 @@ def degenerate_lines(dataset: xr.Dataset, varied: Sequence[str]) -> list[str]:
         pairs = zip(varied, values, strict=True)
         where = ", ".join(f"{name} = {value:.12g}" for name, value in pairs)
         lines.append(f"{kind.replace('_', ' ')} of {n}:{w} at {where}.")
-    return lines
+    more = len(lines) - LISTED
+    return [*lines[:LISTED], *([f"{more} more points are in the result."] if more > 0 else [])]

@@ -73,11 +73,7 @@ def sweep_dataset(  # noqa: PLR0913, PLR0917 (the parts of a sweep)
 
 
 def _table(
-    maps: Mapping[Place, Mapped],
-    numbers: Numbers,
-    axes: Sequence[Varied],
-    cells: int,
-    units: Units,
+    maps: Mapping[Place, Mapped], numbers: Numbers, axes: Sequence[Varied], cells: int, units: Units
 ) -> dict[str, Any]:
     """Return the attractors as variables."""
     dims = (*(axis.name for axis in axes), "attractor")

@@ -278,9 +278,9 @@ def _one(model: Pendulum | Rig, name: str, values: Floats) -> Varied:
     effects = {e.name: e for e in model.effects}
     shared = [f"{e.name}.{parameter}" for e in model.effects for parameter in e.parameters]
     if name not in conversions and name not in shared:
-        there = ", ".join([*conversions, *shared])
         raise InputError(
-            f"{short_repr(name)} is no parameter of this model: it must be one of {there}"
+            f"{short_repr(name)} is no parameter of this model: it must be one of "
+            f"{', '.join([*conversions, *shared])}, or EFFECT.PARAMETER as pendmap effects lists"
         )
     if name in conversions:
         bare, factor, power = conversions[name]

@@ -73,7 +73,8 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
         f"Bifurcations over {names.over([varied])}",
         f"{names.parameters(facts(dataset), [varied])};   {count} values, {starts} starts each",
         [[panels[0]], [panels[2]], [panels[3]]],
-        recorded=panels,
+        recorded=continuation.recorded(panels, _moving(dataset, every), angle, speed),
+        timeline=(varied, np.sort(dataset[varied].values)),
         heights=_HEIGHTS,
         size=_SIZE,
         letters=False,
@@ -107,6 +108,21 @@ def _points(dataset: xr.Dataset, every: list[Family], which: str) -> list[Mark]:
     if (branches := followed(dataset)).sizes:
         drawn += [*continuation.lines(branches, which, None), *continuation.events(branches, which)]
     return drawn
+
+
+def _moving(dataset: xr.Dataset, every: list[Family]) -> dict[str, list[Mark]]:
+    """Return the attractors and the unstable orbits at each value."""
+    moving: dict[str, list[Mark]] = {name: [] for name in ("theta", "velocity", "phase")}
+    if (branches := followed(dataset)).sizes:
+        at = np.sort(dataset[str(dataset.attrs["varied"])].values)
+        orbits = continuation.at_values(branches, at, None)
+        moving = {name: [one for one in orbits[name] if "unstable" in one.path] for name in moving}
+    for k, one in enumerate(every):
+        look: dict[str, Any] = {"colour": one.colour, "size": 3.0 if one.chaotic else 9.0}
+        for marks, axes in zip(moving.values(), ([0, 1], [0, 2], [1, 2]), strict=True):
+            at = one.points[:, axes].T
+            marks.append(Points(*at, when=one.points[:, 0], path=f"now/{k}", **look))
+    return moving
 
 
 def _sweeps(

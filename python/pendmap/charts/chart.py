@@ -73,7 +73,8 @@ class Chart:
     ``rows`` are the rows of panels of a figure, from the top; ``heights`` are their relative
     heights, ``ratio`` the height of a panel over its width, and ``size`` the size of the figure in
     inches, if fixed. A recording shows the panels ``recorded``, by default those of the figure, as
-    ``tabs`` or below one another. ``notes`` are below the panels.
+    ``tabs`` or below one another; with a ``timeline``, name and values of a parameter, it steps
+    through these, and the last panel is below the tabs. ``notes`` are below the panels.
     """
 
     title: str
@@ -86,6 +87,7 @@ class Chart:
     size: Ends | None = None
     letters: bool = True
     tabs: bool = False
+    timeline: tuple[str, npt.NDArray[np.float64]] | None = None
     notes: Sequence[str] = ()
 
     @property

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -23,25 +25,23 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-    from pendmap.charts.marks import Dash, Ends, Floats
+    from pendmap.charts.marks import Dash, Floats
 
 _COLOURS: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
-_UNSTABLE: Final = {"colour": "#555555", "width": 0.7, "name": "unstable"}
-_MARKERS: Final = {
-    "fold": "s",
-    "period_doubling": "o",
-    "symmetry_breaking": "^",
-    "neimark_sacker": "D",
-    **dict.fromkeys(("stick_onset", "grazing", "rest_boundary"), "v"),
-    "cusp": "s",
-    "generalised_doubling": "o",
-    "degenerate_symmetry_breaking": "^",
+_GREY: Final = "#555555"
+_UNSTABLE: Final = {"colour": _GREY, "width": 0.7, "name": "unstable"}
+_KINDS: Final = ("fold", "period_doubling", "symmetry_breaking")
+_DASHES: Final[dict[str, Dash]] = dict(zip(_KINDS, ("-", DASHED, DOTTED), strict=True))
+_STEPS: Final = 401  # Values of a parameter, besides those of events, in a recording
+_SIDES: Final = ("theta", "velocity")
+_MOVING: Final = {
+    "phase": _SIDES,
+    "theta": ("value", "theta"),
+    "velocity": ("value", "velocity"),
+    "resonance": ("value", "amplitude"),
+    "curves": ("across", "value"),
 }
-_DASHES: Final[dict[str, Dash]] = {
-    "fold": "-",
-    "period_doubling": DASHED,
-    "symmetry_breaking": DOTTED,
-}
+"""Coordinates of the points of orbits at a value of the parameter, by panel."""
 _SHADES: Final = ("#ffffff", "#f0f0f0", "#e2e2e2", "#d4d4d4", "#c6c6c6")  # By stable orbits
 _EMPTY: Final[dict[str, Any]] = {"fill": "#ffffff", "edge": INK, "edge_width": 1.0}
 
@@ -53,26 +53,31 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
     """
     del cells
     a, name = facts(dataset), str(dataset.attrs["varied"])
+    which = "place" if "curve_kind" in dataset else "point"
+    theta, speed = (dataset[f"{which}_{one}"].values for one in _SIDES)
+    sides = names.phase_plane(plane.angles(dataset, theta), holding(speed), Units.of(a))
     if "curve_kind" in dataset:
         both = name.split(", ")
         ends = zip(np.ravel(a["low"]).tolist(), np.ravel(a["high"]).tolist(), strict=True)
         of = (str(dataset[f"place_{one}"].attrs.get("units", "1")) for one in both)
         triples = zip(both, of, ends, strict=True)
         across, up = (Axis(names.symbol(one, unit), pair) for one, unit, pair in triples)
-        marks = [*_stable(dataset, across.ends, up.ends), *bifurcation_set(dataset, both)]
-        panel = Panel("curves", "", across, up, marks)
+        marks = [*_stable(dataset, both), *bifurcation_set(dataset, both, halo="#ffffff")]
+        panels = [Panel("curves", "", across, up, marks)]
+        steps = np.linspace(a["low"][1], a["high"][1], _STEPS)
+        moving = recorded(panels, _critical(dataset, both, steps), *sides)
         title = f"Bifurcations of orbits up to {a['up_to']} periods over {names.over(both)}"
-        return Chart(title, names.parameters(a, both), [[panel]], size=(7.4, 5.6)).only(layer)
-    units = Units.of(a)
-    theta = plane.angles(dataset, dataset["point_theta"].values)
-    sides = names.phase_plane(theta, holding(dataset["point_velocity"].values), units)
+        look: dict[str, Any] = {"timeline": (both[1], steps), "size": (7.4, 5.6)}
+        return Chart(title, names.parameters(a, both), [panels], recorded=moving, **look).only(
+            layer
+        )
     label = names.symbol(name, str(dataset["orbit_value"].attrs.get("units", "1")))
     below = Axis(label, (float(a["low"]), float(a["high"])))
     types = dict.fromkeys((n, abs(w)) for n, w in rows(dataset, "branch_n", "branch_w"))
     colours = dict(zip(types, itertools.cycle(_COLOURS), strict=False))
     panels = [
         Panel(which, "", below, side, [*lines(dataset, which, colours), *events(dataset, which)])
-        for which, side in zip(("theta", "velocity"), sides, strict=True)
+        for which, side in zip(_SIDES, sides, strict=True)
     ]
     if name in {"omega", "frequency_hz"} and np.isfinite(dataset["orbit_amplitude"]).any():
         side = Axis("amplitude (rad)", (0.0, 1.05 * float(dataset["orbit_amplitude"].max())))
@@ -81,8 +86,86 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
         panels.append(Panel("resonance", "", below, side, marks))
     which = f"{a['n']}:{a['w']}" if "n" in a else f"up to period {a['up_to']}"
     title = f"Branches of orbits {which} over {names.over([name])}"
+    steps = np.union1d(np.linspace(a["low"], a["high"], _STEPS), dataset["event_value"])
+    moving = recorded(panels, at_values(dataset, steps, colours), *sides)
+    look = {"recorded": moving, "timeline": (name, steps), "size": (7.4, 6.8)}
     chosen = names.parameters(a, [name])
-    return Chart(title, chosen, [[panel] for panel in panels], size=(7.4, 6.8)).only(layer)
+    return Chart(title, chosen, [[panel] for panel in panels], **look).only(layer)
+
+
+def recorded(
+    panels: Sequence[Panel], moving: Mapping[str, list[Mark]], angle: Axis, speed: Axis
+) -> list[Panel]:
+    """Return panels with their marks that move, and the phase plane with its own."""
+    every = [*panels, Panel("phase", "Phase plane", angle, speed, [])]
+    return [replace(one, marks=[*one.marks, *moving.get(one.name, ())]) for one in every]
+
+
+def at_values(
+    dataset: xr.Dataset, steps: Floats, colours: Mapping[tuple[int, int], str] | None
+) -> dict[str, list[Mark]]:
+    """Return the orbits at values of the parameter, for each panel; without colours grey."""
+    orbit, branch = dataset["point_orbit"].values, dataset["orbit_branch"].values
+    place = np.arange(orbit.size) - np.searchsorted(orbit, orbit)
+    order = np.lexsort((orbit, place, branch[orbit]))
+    orbit, place = orbit[order], place[order]
+    types = [(n, abs(w)) for n, w in rows(dataset, "branch_n", "branch_w")]
+    shades = {f"{n}:{w}": colours[n, w] if colours else _GREY for n, w in types}
+    columns = {f"point_{name}": order for name in _SIDES}
+    columns |= {f"orbit_{name}": orbit for name in ("value", "amplitude")}
+    points = {name[6:]: dataset[name].values[of] for name, of in columns.items()}
+    points["type"] = np.array([f"{n}:{w}" for n, w in types])[branch[orbit]]
+    points["stable"] = _shown(dataset, 0)[orbit]
+    points["line"] = branch[orbit] * (1 + int(place.max(initial=0))) + place
+    return _moving(dataset, points, steps, shades)
+
+
+def _critical(dataset: xr.Dataset, both: Sequence[str], steps: Floats) -> dict[str, list[Mark]]:
+    """Return the orbits to which something happens at values of the second parameter."""
+    names = dict(zip(("across", "value", *_SIDES), (*both, *_SIDES), strict=True))
+    points = {key: dataset[f"place_{name}"].values for key, name in names.items()}
+    points["line"] = owner = dataset["place_curve"].values
+    every = enumerate(rows(dataset, "curve_n", "curve_w"))
+    looks = [_type_of(dataset, np.flatnonzero(owner == k), n, w) for k, (n, w) in every]
+    points["type"] = np.array([name for name, _ in looks])[owner]
+    points["stable"] = np.ones(owner.size, dtype=bool)
+    return _moving(dataset, points, steps, dict(looks))
+
+
+def _moving(
+    dataset: xr.Dataset, points: Mapping[str, Any], steps: Floats, colours: Mapping[str, str]
+) -> dict[str, list[Mark]]:
+    """Return the points of lines at values of their parameter, interpolated, for each panel."""
+    x, stable = points["value"], points["stable"]
+    low, high = np.sort([x[:-1], x[1:]], axis=0)
+    crossed = (low <= steps[:, None]) & (steps[:, None] <= high) & (low < high)
+    new = np.diff(points["line"], append=-1) != 0
+    step, at = np.nonzero(crossed & ~new[:-1])
+    part = (steps[step] - x[at]) / (x[at + 1] - x[at])
+    once = (part < 1) | new[at + 1]  # a point where two pieces meet
+    step, at, part = step[once], at[once], part[once]
+    places = {}
+    for name in {*points} & {"value", "across", "amplitude", *_SIDES}:
+        gap = points[name][at + 1] - points[name][at]
+        places[name] = points[name][at] + part * (plane.wrapped(gap) if name == "theta" else gap)
+    if not plane.on_line(dataset):
+        places["theta"] = plane.wrapped(places["theta"])
+    marks: dict[str, list[Mark]] = {panel: [] for panel in _MOVING}
+    for name, way in itertools.product(colours, (True, False)):
+        mine = (points["type"][at] == name) & ((stable[at] & stable[at + 1]) == way)
+        path = re.sub(r"\W", "_", name) + "/unstable" * (not way)
+        look: dict[str, Any] = {"colour": colours[name], "path": f"now/{path}"}
+        look |= {"size": 9.0 if way else 5.0, "when": steps[step[mine]]}
+        for panel, sides in _MOVING.items() if mine.any() else ():
+            if sides[0] in places and sides[1] in places:
+                marks[panel].append(Points(*(places[side][mine] for side in sides), **look))
+    return marks
+
+
+def _shown(dataset: xr.Dataset, way: int) -> Any:  # noqa: ANN401 (an array)
+    """Return which orbits are stable, or not; events belong to the pieces on both sides."""
+    stable = dataset["orbit_stable"].values.astype(bool)
+    return (stable != way) | np.isin(np.arange(stable.size), dataset["event_orbit"].values)
 
 
 def lines(
@@ -90,9 +173,7 @@ def lines(
 ) -> Iterator[Mark]:
     """Yield the branches, one line for each of their points; without colours unstable ones."""
     branch, value = dataset["orbit_branch"].values, dataset["orbit_value"].values
-    stable, of = dataset["orbit_stable"].values.astype(bool), dataset["point_orbit"].values
-    # Pieces on both sides of an event end there.
-    ends = np.isin(np.arange(value.size), dataset["event_orbit"].values)
+    of = dataset["point_orbit"].values
     whole = which == "amplitude"  # one number of an orbit, not of each of its points
     y = dataset["orbit_amplitude" if whole else f"point_{which}"].values
     for number, (n, w) in enumerate(rows(dataset, "branch_n", "branch_w")):
@@ -100,7 +181,7 @@ def lines(
         points, x = y[mine][:, None] if whole else y[mine[of]].reshape(-1, n), value[mine]
         for way in range(2):
             dash: Dash = DASHED if way else "-"
-            shown = (stable != way) | ends
+            shown = _shown(dataset, way)
             for k in range(points.shape[1] if colours or way else 0):
                 line = np.where(shown[mine], points[:, k], np.nan)
                 wraps = np.abs(np.diff(line, prepend=line[:1])) > np.pi
@@ -108,7 +189,7 @@ def lines(
                 look: dict[str, Any] = _UNSTABLE
                 if colours:
                     name = f"{n}:{abs(w)}" if way + k == 0 else ""
-                    look = {"colour": colours[n, abs(w)], "name": name}
+                    look = {"colour": colours[n, abs(w)], "name": name, "width": 1.3 - 0.5 * way}
                 yield Line(x, line, dash=dash, path=f"branch/{number}/{way}/{k}", **look)
 
 
@@ -126,7 +207,7 @@ def events(dataset: xr.Dataset, which: str) -> Iterator[Mark]:
 
 def _events(kind: str, x: Floats, y: Floats) -> Points:
     """Return points at which something happens."""
-    look: dict[str, Any] = {"marker": _MARKERS[kind], "name": kind.replace("_", " ")}
+    look: dict[str, Any] = {"marker": palette.MARKERS[kind], "name": kind.replace("_", " ")}
     return Points(x, y, size=5.0, order=4.0, **look, **_EMPTY)
 
 
@@ -151,13 +232,14 @@ def _backbones(dataset: xr.Dataset) -> list[Mark]:
     ]
 
 
-def _stable(dataset: xr.Dataset, x: Ends, y: Ends) -> list[Mark]:
+def _stable(dataset: xr.Dataset, over: Sequence[str]) -> list[Mark]:
     """Return how many orbits are stable over the plane, in shades of grey."""
     if "stable_count" not in dataset:
         return []
     counts = dataset["stable_count"].values.clip(0).sum(axis=0).clip(0, len(_SHADES) - 1)
     texts = ["no stable orbit", *(counted(k, "stable orbit") for k in range(1, len(_SHADES)))]
     texts[-1] += " or more"
+    x, y = (plane.outer_edges(dataset, name) for name in over)
     return [Image(counts, x, y, classes=list(zip(texts, _SHADES, strict=True)))]
 
 

@@ -80,9 +80,7 @@ def part(report: IdentificationReport) -> Chart:
 
 def _whole(course: Course, peaks: Peaks, *, thin: bool) -> Panel:
     """Return the whole record, as a line if ``thin``, else as its peaks alone."""
-    marks: list[Mark] = [
-        Points(course.other_time, course.other_theta, colour=UNUSED, size=1.2),
-    ]
+    marks: list[Mark] = [Points(course.other_time, course.other_theta, colour=UNUSED, size=1.2)]
     if thin:
         marks += _coloured(course.time, course.theta, course.half, 0.6)
     marks += _peaks(peaks, 1.6 if thin else 3.0, by_parity=not thin)

@@ -55,7 +55,8 @@ class Line(Mark):
 class Points(Mark):
     """Separate points; ``fill`` and ``edge`` default to ``colour``.
 
-    A figure may show many points as their density in columns, if edges of ``cells`` are given.
+    A figure may show many points as their density in columns, if edges of ``cells`` are given. A
+    recording shows points only at their values ``when`` of the timeline of the chart.
     """
 
     x: Floats
@@ -69,6 +70,7 @@ class Points(Mark):
     halo: str = ""
     clip: bool = True
     cells: Floats | None = None
+    when: Floats | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,6 +18,7 @@ from pendmap.charts.continuation import bifurcation_set
 from pendmap.charts.legend import colours_of
 from pendmap.charts.marks import Colours, Image, Mark
 from pendmap.files import facts
+from pendmap.files.toml import packaged
 from pendmap.units import Units
 
 if TYPE_CHECKING:
@@ -27,15 +28,7 @@ if TYPE_CHECKING:
     from pendmap.charts.chart import Chart
     from pendmap.charts.marks import Ends, Floats
 
-LAYERS = {
-    "kinds": "kinds of attractor",
-    "exponent": "largest Lyapunov exponent",
-    "attractors": "attractors that coexist",
-    "period": "period of what most starts end on",
-    "winding": "turns in that period",
-    "undecided": "share of the starts undecided",
-    "certainty": "probability of the most likely regime",
-}
+LAYERS: Final[dict[str, str]] = packaged("charts/layers.toml")["parameter_map"]
 """Layers by the name a user types; ``share KIND`` is the share of the starts on a kind."""
 
 _RECORDED: Final = ("exponent", "attractors", "undecided")

@@ -56,13 +56,8 @@ _TABLES: Final = {
 }
 """Variables that number the rows of a table, the column of these numbers or of names, the table."""
 _OF_THE_WHOLE: Final = (
-    "mean_settle",
-    "longest_settle",
-    "mean_periods",
-    "basin_entropy",
-    "boundary_",
-    "uncertainty_",
-    "neighbours_",
+    *("mean_settle", "longest_settle", "mean_periods"),
+    *("basin_entropy", "boundary_", "uncertainty_", "neighbours_"),
 )
 """Prefixes of facts that hold for a whole basin map alone."""
 

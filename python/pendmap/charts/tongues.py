@@ -21,11 +21,7 @@ if TYPE_CHECKING:
 
     from pendmap.charts.marks import Floats
 
-_COLOURS: Final = {
-    "symmetry_breaking": "#d55e00",
-    "fold": "#009e73",
-    "period_doubling": "#0072b2",
-}
+_COLOURS: Final = {"symmetry_breaking": "#d55e00", "fold": "#009e73", "period_doubling": "#0072b2"}
 _STABLE, _INVERTED = "#e3ecd8", "#9a6fb0"
 _DRIVE: Final = {"p", "omega", "phase", "Omega", "phi"}  # Parameters that vary
 _PLANES: Final = {

@@ -29,18 +29,9 @@ _FIT = options.group("Candidates", "--max-effects 1 --without magnet")
 )
 @argument("path", "EXPERIMENT")
 @options_of(
-    "diagnosis.diagnose.diagnose",
-    "model max_effects without",
-    _FIT,
-    model=FILE,
-    without=EFFECT,
+    "diagnosis.diagnose.diagnose", "model max_effects without", _FIT, model=FILE, without=EFFECT
 )
-@option(
-    "--effects formulas",
-    FILE,
-    "Further candidates: [[formula]] of a .toml.",
-    group=_FIT,
-)
+@option("--effects formulas", FILE, "Further candidates: [[formula]] of a .toml.", group=_FIT)
 @reading_options
 @options.simd_option
 @option(

@@ -226,7 +226,7 @@ def diagnosed_model(diagnosis: Discrepancy, command: str = "") -> Rig:
             "method": "diagnose",
             "verdict": diagnosis.verdict,
             "held_out": list(dict.fromkeys(run.name for run in diagnosis.data.held)),
-        },
+        }
     }
     if diagnosis.best.fitted.zeroed:
         notes["provenance"]["set_to_zero"] = list(diagnosis.best.fitted.zeroed)

@@ -102,11 +102,7 @@ def _other_shapes(scores: Scores, places: Sequence[int], thresholds: Thresholds)
 
 
 def drop_effect(
-    data: DataSplit,
-    fitted: FittedModel,
-    dropped: Candidate,
-    level: float,
-    target: float = math.inf,
+    data: DataSplit, fitted: FittedModel, dropped: Candidate, level: float, target: float = math.inf
 ) -> FittedModel | None:
     """Return a model without one of its effects, fitted from the present motion.
 

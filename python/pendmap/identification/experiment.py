@@ -19,12 +19,7 @@ from pendmap.errors import (
 )
 from pendmap.identification.fit import refuse_astray
 from pendmap.identification.methods.base import Identification
-from pendmap.identification.methods.registry import (
-    BEST,
-    apply_method,
-    check_names,
-    identify_peaks,
-)
+from pendmap.identification.methods.registry import BEST, apply_method, check_names, identify_peaks
 from pendmap.identification.methods.trajectory import (
     DRAG,
     JointFit,
@@ -266,11 +261,7 @@ def identified_model(report: IdentificationReport, command: str = "") -> Rig:
 
 
 def provenance(
-    files: Mapping[str, str],
-    command: str,
-    *,
-    rms: float | None = None,
-    noise: float | None = None,
+    files: Mapping[str, str], command: str, *, rms: float | None = None, noise: float | None = None
 ) -> dict[str, Any]:
     """Return the table ``[provenance]`` of a model file from records and their SHA-256.
 

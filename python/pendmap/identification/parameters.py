@@ -53,10 +53,7 @@ class Quantity:
 
 
 def free_quantities(
-    runs: Sequence[FitRun],
-    rigs: Sequence[Rig],
-    free: Sequence[str],
-    start: Mapping[str, float],
+    runs: Sequence[FitRun], rigs: Sequence[Rig], free: Sequence[str], start: Mapping[str, float]
 ) -> list[Quantity]:
     """Return the free parameters of a fit to runs with given rigs.
 

@@ -149,10 +149,7 @@ def errors_of(method: str, peaks: Peaks, times: Floats, angles: Floats) -> PeakE
     )
 
 
-def table1(
-    record_peaks: Peaks,
-    identifications: Mapping[str, Identification],
-) -> Table1:
+def table1(record_peaks: Peaks, identifications: Mapping[str, Identification]) -> Table1:
     """Compare simulations of identified models from the first peak with a record.
 
     The rows have the measured periods and peaks nearest to those of the paper's table.

@@ -5,13 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Final
 
-from pendmap.errors import (
-    InputError,
-    check_keys,
-    check_number,
-    check_whole,
-    short_repr,
-)
+from pendmap.errors import InputError, check_keys, check_number, check_whole, short_repr
 from pendmap.files import toml_text
 from pendmap.model import quantities
 from pendmap.model.covariance import without

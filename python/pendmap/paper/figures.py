@@ -17,6 +17,7 @@ from pendmap.charts.chart import Axis, Chart, Panel, holding
 from pendmap.charts.marks import Line, Points
 from pendmap.errors import InputError
 from pendmap.files import facts, whole_file
+from pendmap.files.toml import packaged
 from pendmap.units import Units
 
 if TYPE_CHECKING:
@@ -28,18 +29,8 @@ if TYPE_CHECKING:
     from pendmap.identification import IdentificationReport
 
 TABLE: Final = "table1"
-FIGURES: Final = {
-    "1": "Critical curves; strange attractors a, b and c",
-    "2": "Tumbling chaos",
-    "3": "The parametric pendulum",
-    "4": "A decay, its velocity and half cycles",
-    "5": "The decrement of each three peaks",
-    "6": "The decay by each model",
-    "7": "The errors of each model",
-    "8": "Steady states after 2500 s",
-    "9": "Transient tumbling",
-    TABLE: "Damping by each method, and the errors of its simulation (%)",
-}
+_TABLES: Final = packaged("paper/figures.toml")
+FIGURES: Final[dict[str, str]] = _TABLES["titles"]
 """Titles of the figures, by the names a user types."""
 HISTORY, CURVE = 60, 100  # Periods of time history and phase curve of figure 2, the first ones
 _INK = "#1d3557"
@@ -47,15 +38,9 @@ _TRANSIENT: Final = 500  # Forcing periods before figure 2 begins
 _RIG: Final = "virtual rig like the paper's: w0 6.2 rad/s, c/m 0.0496 1/s, Tr 0.08 rad/s²"
 _PARTS: Final = {"4": "record", "5": "decrement", "6": "decay", "7": "errors", TABLE: "table"}
 
-PRINTED: Final = {
-    "combined": (7.31, 7.18, 0.0, 1.58),
-    "log_decrement": (16.95, 17.46, 4.35, 6.04),
-    "de_paula": (64.81, 41.58, 9.17, 13.29),
-}
-"""The paper's table 1, percent: periods of 0.26 s and 1.54 s, peaks of 1.2 rad and 2.53 rad."""
 _PRINTED_HEAD: Final = ("period 0.26 s", "period 1.54 s", "peak 1.2 rad", "peak 2.53 rad")
-_SQUARES: Final = (0.15, 1.6)  # Range of alpha^2 of figure 1
-_HIGHEST: Final = 2.6  # Largest e of figure 1
+_SQUARES: Final = (0.05, 1.6)  # Range of alpha^2 of figure 1
+_HIGHEST: Final = 18.0  # Largest p of figure 1; no curve of its plane lies above
 _COLUMNS: Final = 120  # Number of frequencies of figure 1
 
 
@@ -158,7 +143,7 @@ def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
     if key == "1":
         marks = [(one.p, one.omega, name[-1]) for name, one in sorted(PRESETS.items())]
         omega = 1 / np.sqrt(np.linspace(*_SQUARES, _COLUMNS)[::-1])
-        rests = pendmap.tongues(PRESETS["fig2a"], omega, _HIGHEST / _SQUARES[0])
+        rests = pendmap.tongues(PRESETS["fig2a"], omega, _HIGHEST)
         return render.draw(tongues.chart(rests, layer="e-alpha2", title=title, marks=marks), path)
     if key == "2":
         return render.draw(tumbling_chart(tumbling(), title), path)
@@ -177,7 +162,7 @@ def draw(key: str, path: str | os.PathLike[str], *, seed: int = 0) -> Path:
 
 def printed_table() -> tuple[list[str], list[list[str]]]:
     """Return table 1 as printed in the paper, header and rows."""
-    rows = [[name, *(f"{x:g} %" for x in row)] for name, row in PRINTED.items()]
+    rows = [[name, *(f"{x:g} %" for x in row)] for name, row in _TABLES["printed"].items()]
     return ["the paper's own", *_PRINTED_HEAD], rows
 
 

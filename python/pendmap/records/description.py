@@ -9,14 +9,7 @@ import dataclasses
 import math
 from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar
 
-from pendmap.errors import (
-    InputError,
-    check_flag,
-    check_keys,
-    check_number,
-    check_whole,
-    short_repr,
-)
+from pendmap.errors import InputError, check_flag, check_keys, check_number, check_whole, short_repr
 from pendmap.tables.text import Reader
 from pendmap.tables.units import CHANNELS, PIVOT_UNITS, spelling
 

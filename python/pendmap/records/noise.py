@@ -115,11 +115,7 @@ def noise_floor(run: Run | Experiment) -> NoiseFloor:
 
 
 def noise_of(
-    time: Floats,
-    theta: Floats,
-    *,
-    trusted: Mask | None = None,
-    count: float = 0.0,
+    time: Floats, theta: Floats, *, trusted: Mask | None = None, count: float = 0.0
 ) -> NoiseFloor:
     """Return the noise of readings of a smooth motion, of resolution ``count``, rad."""
     bad = np.zeros(time.size, bool) if trusted is None else ~trusted

@@ -234,7 +234,7 @@ def shape(texts: Sequence[str], room: float) -> tuple[list[str], int]:
 
 def _handle(mark: Mark) -> Any:  # noqa: ANN401 (an artist)
     if isinstance(mark, charts.Line):
-        return Line2D([], [], **(_look(mark) | {"lw": max(mark.width, 1.0)}))
+        return Line2D([], [], **(_look(mark) | {"lw": max(mark.width, 0.6)}))
     if isinstance(mark, charts.Points):
         size = min(max(mark.size, 3.0), 9.0)
         return Line2D([], [], **(_spots(mark) | {"ms": size}))

@@ -154,10 +154,7 @@ def colour_map(name: str | Colormap) -> Colormap:
 
 
 def written(
-    path: str | os.PathLike[str],
-    make: Callable[[float], Figure],
-    *,
-    dpi: float | None = None,
+    path: str | os.PathLike[str], make: Callable[[float], Figure], *, dpi: float | None = None
 ) -> Path:
     """Write the figure that ``make`` returns for a resolution into a file; return its path."""
     pixels, (low, high) = 200.0 if dpi is None else float(dpi), DPI

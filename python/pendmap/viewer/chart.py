@@ -47,6 +47,8 @@ class Drawing:
     def container(self) -> rrb.Container:
         """Layout of the panels: tabs, or below one another, in two columns if they are many."""
         views, name = [place.view() for place in self.places], plain(self.chart.title)
+        if self.chart.timeline:
+            return rrb.Vertical(rrb.Tabs(*views[:-1], active_tab=0), views[-1], name=name)
         if self.chart.tabs:
             return rrb.Tabs(*views, active_tab=0, name=name)
         if len(views) > FEW:
@@ -86,13 +88,13 @@ def log(stream: rr.RecordingStream, drawn: Iterable[Drawing], summary: str) -> N
     """Log the panels of charts, their legend and a summary."""
     recording.text(stream, "summary", summary)
     recording.text(stream, "legend", "\n".join(line for one in drawn for line in one.legend()))
-    for place in (place for one in drawn for place in one.places):
+    for place, steps in ((place, one.chart.timeline) for one in drawn for place in one.places):
         if place.panel.bare:
             recording.text(stream, place.root, "\n".join(_document(place.panel.marks)))
             continue
         place.log_frame(stream)
         for number, mark in enumerate(place.panel.marks):
-            marks.log(stream, place, mark, number)
+            marks.log(stream, place, mark, number, steps)
 
 
 def _document(every: Sequence[Mark]) -> Iterator[str]:
@@ -126,6 +128,8 @@ def contents(dataset: xr.Dataset) -> dict[str, Any]:
     drawn = drawings(registry.build(dataset, cells=CELLS))
     text = "\n\n".join(str(attrs.get("summary", "")).splitlines())
     return made | {
-        "layout": recording.screen(drawn[0].container, ASIDE, shares=[6, 5]),
+        "layout": recording.screen(
+            drawn[0].container, ASIDE, shares=[6, 5], steps=drawn[0].chart.timeline
+        ),
         "log": functools.partial(log, drawn=drawn, summary=text),
     }

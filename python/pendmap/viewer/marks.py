@@ -189,13 +189,32 @@ def _values(mark: Mark, which: str) -> Floats:
     return np.concatenate([np.empty(0), *(np.ravel(array) for array in arrays)])
 
 
-def log(stream: rr.RecordingStream, place: Place, mark: Mark, number: int) -> None:
-    """Log a mark under its path, or else its number and name; it covers those before it."""
+def log(
+    stream: rr.RecordingStream,
+    place: Place,
+    mark: Mark,
+    number: int,
+    steps: tuple[str, Floats] | None = None,
+) -> None:
+    """Log a mark under its path, or else its number and name; it covers those before it.
+
+    Points with values ``when`` are logged at each of the ``steps``, the values of a timeline.
+    """
     leaf = re.sub(r"\W+", "_", f"{number}_{mark.name}").strip("_")
     path = f"{place.root}/data/{mark.path or leaf}"
     order = 0.01 * number if mark.order is None else mark.order
     if isinstance(mark, charts.Image):
         _log_image(stream, place, mark, path)
+    elif isinstance(mark, charts.Points) and mark.when is not None and steps is not None:
+        look: dict[str, Any] = {"colors": [_shade(mark.colour)], "draw_order": POINTS + order}
+        look["radii"] = rr.Radius.ui_points(0.7 * mark.size)
+        stream.log(path, rr.Points2D.from_fields(**look), static=True)
+        at, number_of = place.points(mark.x, mark.y), np.searchsorted(steps[1], mark.when)
+        shown = np.argsort(number_of, kind="stable")
+        shown = shown[place.inside(at[shown])]
+        counts = np.bincount(number_of[shown], minlength=steps[1].size)
+        columns = rr.Points2D.columns(positions=at[shown].astype(np.float32)).partition(counts)
+        stream.send_columns(path, [rr.TimeColumn(steps[0], duration=steps[1])], columns)
     elif isinstance(mark, charts.Points):
         for leaf, points in _points(mark, place, POINTS + order):
             stream.log(f"{path}{leaf}", points, static=True)
@@ -205,7 +224,7 @@ def log(stream: rr.RecordingStream, place: Place, mark: Mark, number: int) -> No
     elif not isinstance(mark, charts.Line) or np.size(mark.x) or mark.path:
         above = LINES if isinstance(mark, charts.Line | charts.Steps | charts.Level) else AREAS
         lines = place.lines(*_outlines(mark, place))
-        look: dict[str, Any] = {"colors": [_shade(mark.colour)], "draw_order": above + order}
+        look = {"colors": [_shade(mark.colour)], "draw_order": above + order}
         look["radii"] = rr.Radius.ui_points(getattr(mark, "width", THIN))
         if mark.name and lines:  # shown where one points
             look |= {"labels": [mark.name] * len(lines), "show_labels": False}

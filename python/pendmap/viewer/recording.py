@@ -97,13 +97,21 @@ def text(stream: rr.RecordingStream, path: str, markdown: str) -> None:
     stream.log(path, rr.TextDocument(markdown, media_type="text/markdown"), static=True)
 
 
-def screen(*views: rrb.View | rrb.Container, shares: Sequence[float]) -> rrb.Blueprint:
-    """Return the layout of a window: these views side by side, without automatic ones."""
+def screen(
+    *views: rrb.View | rrb.Container,
+    shares: Sequence[float],
+    steps: tuple[str, Floats] | None = None,
+) -> rrb.Blueprint:
+    """Return the layout of a window: these views side by side, without automatic ones.
+
+    The time panel shows ``steps``, the values of a parameter, and plays them in 20 s.
+    """
+    timeline, speed = (steps[0], float(np.ptp(steps[1])) / 20) if steps else (TIMELINE, 1.0)
     return rrb.Blueprint(
         rrb.Horizontal(*views, column_shares=list(shares)),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
-        rrb.TimePanel(state="collapsed", timeline=TIMELINE),
+        rrb.TimePanel(state="collapsed", timeline=timeline, playback_speed=speed),
         auto_layout=False,
         auto_views=False,
     )

@@ -137,12 +137,7 @@ def series(stream: rr.RecordingStream, attrs: Attributes, motion: Floats, bins: 
 
 
 def moving_parts(
-    stream: rr.RecordingStream,
-    attrs: Attributes,
-    motion: Floats,
-    *,
-    since: int = 0,
-    every: int = 1,
+    stream: rr.RecordingStream, attrs: Attributes, motion: Floats, *, since: int = 0, every: int = 1
 ) -> None:
     """Log the pendulum in arm lengths, x to the right, y upward, and its phase point."""
     time, theta, velocity = motion

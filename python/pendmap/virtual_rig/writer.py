@@ -73,10 +73,7 @@ def write(experiment: Experiment, where: Places) -> None:
     OSError
         If they cannot be written.
     """
-    with (
-        whole_file(where.truth, [".toml"]) as truth,
-        whole_folder(where.experiment) as folder,
-    ):
+    with whole_file(where.truth, [".toml"]) as truth, whole_folder(where.experiment) as folder:
         folder.mkdir()
         for k, run in enumerate(experiment.runs):
             # 12 digits distinguish all counts, and give an angle without counts to 1e-11 rad.

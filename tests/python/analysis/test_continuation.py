@@ -91,6 +91,12 @@ def test_a_start_must_be_near_an_orbit_of_the_model() -> None:
         pendmap.continuation(model, {"p": (0.7, 1.0)}, 1, 1, start=(-0.96, 2.43))
     with pytest.raises(InputError, match="range of two values"):
         pendmap.continuation(model, {"p": (0.7, 0.7)}, 1, 1)
+    with pytest.raises(InputError, match=r"one parameter, or two.*got {'p': \(0, 1\), 'omega'"):
+        pendmap.continuation(model, {"p": (0, 1), "omega": (1, 2), "gamma": (0, 1)})
+    with pytest.raises(InputError, match="longest must be a whole number from 1 to 64, got 0"):
+        pendmap.continuation(model, {"p": (0.7, 1.0)}, longest=0)
+    with pytest.raises(InputError, match=r"or EFFECT\.PARAMETER as pendmap effects"):
+        pendmap.continuation(model, {"quadratic_drag.c": (0.0, 0.1)})
 
 
 def test_all_types_up_to_a_period_give_regions_of_stable_orbits() -> None:

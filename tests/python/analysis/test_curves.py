@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
 import pendmap
-from pendmap.analysis import continuation
+from pendmap.analysis import continuation, curves
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -60,3 +60,18 @@ def test_the_json_object_has_curves_and_points(plane: xr.Dataset) -> None:
 def test_a_period_out_of_range_is_refused() -> None:
     with pytest.raises(pendmap.InputError, match="up_to"):
         pendmap.continuation(PENDULUM, RANGES, up_to=17)
+
+
+@pytest.mark.parametrize("option", [{"n": 2}, {"w": 0}, {"start": (1.0, 0.0)}, {"longest": 4}])
+def test_what_one_parameter_alone_has_is_refused_with_two(option: dict[str, Any]) -> None:
+    with pytest.raises(pendmap.InputError, match="must not be given with two parameters"):
+        pendmap.continuation(PENDULUM, RANGES, up_to=1, **option)
+
+
+def test_a_summary_lists_some_points_and_counts_the_others(plane: xr.Dataset) -> None:
+    many = plane.isel(degenerate=[0] * 20)
+    lines = curves.degenerate_lines(many, ("p", "omega"))
+    assert len(lines) == curves.LISTED + 1
+    assert lines[-1] == "4 more points are in the result."
+    few = curves.degenerate_lines(plane.isel(degenerate=[0]), ("p", "omega"))
+    assert len(few) == 1

@@ -111,10 +111,7 @@ def _declared(node: ast.FunctionDef | ast.ClassDef) -> Iterator[tuple[str, str, 
 
 
 def options_of(
-    path: str,
-    names: str,
-    group: cloup.OptionGroup | None = None,
-    **kinds: click.ParamType[Any],
+    path: str, names: str, group: cloup.OptionGroup | None = None, **kinds: click.ParamType[Any]
 ) -> Decorator:
     """Return options for parameters of a function or a class.
 

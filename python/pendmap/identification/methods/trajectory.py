@@ -250,9 +250,7 @@ def _from_upright(run: Run) -> Run:
 
 
 def fit_trusted(
-    runs: Sequence[Run],
-    start: Rig | Mapping[str, float] | None,
-    effects: Sequence[Effect | str],
+    runs: Sequence[Run], start: Rig | Mapping[str, float] | None, effects: Sequence[Effect | str]
 ) -> JointFit:
     """Return the fit to all trusted readings of runs."""
     readings = [reading_of_run(run) for run in runs]

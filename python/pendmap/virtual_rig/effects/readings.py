@@ -120,11 +120,7 @@ def sensor_lag(seen: Reading, tau: float) -> Floats:
 
 
 @effect(
-    "clock",
-    "reading",
-    "recorded time (1 + e) t",
-    signed=True,
-    e=size(1.3e-05, 5e-05, "", most=0.9),
+    "clock", "reading", "recorded time (1 + e) t", signed=True, e=size(1.3e-05, 5e-05, "", most=0.9)
 )
 def timebase(time: Floats, e: float) -> Floats:
     """The clock of the record runs fast or slow."""
