@@ -42,7 +42,7 @@ from pendmap.records.summary import UNIT_FINDINGS, doubt_keys
 from pendmap.signal.robust import from_first
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Sequence
     from typing import Unpack
 
     from numpy.typing import ArrayLike
@@ -253,20 +253,19 @@ def identified_model(report: IdentificationReport, command: str = "") -> Rig:
         was not fitted.
     """
     best = report.best
-    sha256 = report.experiment.sha256
-    files = {run.file: run.sha256 or sha256.get(run.file, "") for run in report.runs}
     rms = noise = None
     if report.joint is not None and best.method == BEST:
         rms, noise = report.joint.fit.rms, report.joint.noise
-    notes = {"provenance": provenance(files, command, rms=rms, noise=noise)}
-    notes["provenance"]["method"] = best.method
+    origin = provenance(report.experiment, report.runs, command, rms=rms, noise=noise)
+    notes = {"provenance": origin | {"method": best.method}}
     with named(f"{report.run.name}: the result is no valid model"):
         model = report.model
         return dataclasses.replace(model, notes={**model.notes, **notes})
 
 
 def provenance(
-    files: Mapping[str, str],
+    experiment: Experiment,
+    runs: Iterable[Run],
     command: str,
     *,
     rms: float | None = None,
@@ -281,4 +280,5 @@ def provenance(
     if command:
         table["command"] = command
     table |= {name: x for name, x in (("rms", rms), ("noise", noise)) if x is not None}
+    files = {run.file: run.sha256 or experiment.sha256.get(run.file, "") for run in runs}
     return table | {"records": [{"file": name, "sha256": code} for name, code in files.items()]}
