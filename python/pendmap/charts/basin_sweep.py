@@ -25,14 +25,7 @@ if TYPE_CHECKING:
 
 MOST: Final = 12  # Greatest number of attractors that a legend names; all others are grey
 OTHERS: Final = "#c9c9c9"  # Colour of the others
-LAYERS: Final = {
-    "entropy": ("basin_entropy", "basin entropy", "nat"),
-    "boundary": ("boundary_basin_entropy", "entropy of the boundary", "nat"),
-    "uncertainty": ("uncertainty_exponent", "uncertainty exponent", ""),
-    "attractors": ("attractors", "attractors that coexist", ""),
-    "main": ("fraction", "share of the starts", ""),
-    "undecided": ("undecided", "share of the starts undecided", ""),
-}
+LAYERS: Final = palette.SWEEP_LAYERS
 """Layers over two parameters by the name a user types: variable, title and unit."""
 _LEADING: Final = ("entropy", "attractors", "main")
 _SIZE: Final = (7.4, 8.4)  # Size of a figure over one parameter, inches

@@ -11,6 +11,7 @@ import numpy as np
 from pendmap.charts import legend, names, plane
 from pendmap.charts.chart import Chart, Panel, holding
 from pendmap.charts.marks import INK, NONE, QUIET, Colours, Ends, Image, Mark, Points
+from pendmap.charts.palette import BASIN_LAYERS
 from pendmap.errors import InputError
 from pendmap.files import facts
 from pendmap.formatting import counted
@@ -36,16 +37,7 @@ class Layer:
     colours: str = ""
 
 
-LAYERS: Final = {
-    "labels": Layer("label", "basins of attraction{unsure}"),
-    "settle": Layer("settle_periods", "settle time", "periods{of} to settle", "viridis"),
-    "turns": Layer("net_turns", "net turns {until}", "net turns", "RdBu_r"),
-    "exponent": Layer(
-        "finite_time_exponent", "finite-time exponent over {periods}", "exponent {rate}", "magma"
-    ),
-    "probability": Layer("certainty", "most likely end over {draws}", "probability", "cividis"),
-    "entropy": Layer("label_entropy", "doubt of the end over {draws}", "entropy (nat)", "magma"),
-}
+LAYERS: Final = {name: Layer(*about) for name, about in BASIN_LAYERS.items()}
 """Layers by the name a user types."""
 
 
