@@ -13,6 +13,7 @@ from pendmap.charts.chart import Chart, Panel, holding
 from pendmap.charts.marks import INK, NONE, QUIET, Colours, Ends, Image, Mark, Points
 from pendmap.errors import InputError
 from pendmap.files import facts
+from pendmap.files.toml import packaged
 from pendmap.formatting import counted
 from pendmap.units import Units
 
@@ -37,14 +38,7 @@ class Layer:
 
 
 LAYERS: Final = {
-    "labels": Layer("label", "basins of attraction{unsure}"),
-    "settle": Layer("settle_periods", "settle time", "periods{of} to settle", "viridis"),
-    "turns": Layer("net_turns", "net turns {until}", "net turns", "RdBu_r"),
-    "exponent": Layer(
-        "finite_time_exponent", "finite-time exponent over {periods}", "exponent {rate}", "magma"
-    ),
-    "probability": Layer("certainty", "most likely end over {draws}", "probability", "cividis"),
-    "entropy": Layer("label_entropy", "doubt of the end over {draws}", "entropy (nat)", "magma"),
+    name: Layer(*about) for name, about in packaged("charts/layers.toml")["basins"].items()
 }
 """Layers by the name a user types."""
 

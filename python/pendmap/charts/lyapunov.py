@@ -51,12 +51,6 @@ def _rate(dataset: xr.Dataset) -> str:
     return f"λ ({names.per_time(Units.of(facts(dataset)))})"
 
 
-def _transient(dataset: xr.Dataset) -> list[Mark]:
-    periods = max(int(dataset["transient_periods"]), 0)
-    text = f"transient, {counted(periods, 'period')}"
-    return [Span((0, periods), colour=_TRANSIENT, name=text), ZERO] if periods else [ZERO]
-
-
 def _mean_look(dataset: xr.Dataset) -> dict[str, Any]:
     """Return the look of lines that show the exponent; their name is its value with its error."""
     a, text = facts(dataset), ""
@@ -74,8 +68,11 @@ def _level(dataset: xr.Dataset, axis: Literal["x", "y"] = "y") -> Level:
 
 def _growth(dataset: xr.Dataset) -> Panel:
     a, periods, growth = facts(dataset), dataset["elapsed"].values, dataset["growth"].values
-    marks = [*_transient(dataset), Line(periods, growth, colour=_LINE, width=1.1, path="own")]
     rate, transient = float(a["per_period"]), max(int(a["transient_periods"]), 0)
+    marks: list[Mark] = [ZERO, Line(periods, growth, colour=_LINE, width=1.1, path="own")]
+    if transient:
+        text = f"transient, {counted(transient, 'period')}"
+        marks.insert(0, Span((0, transient), colour=_TRANSIENT, name=text))
     if math.isfinite(rate) and math.isfinite(a["largest_exponent_stderr"]):
         begin = min(int(np.searchsorted(periods, transient)), periods.size - 1)
         # Over many decades the constant matters little, so that the line meets the end.

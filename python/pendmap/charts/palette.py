@@ -3,7 +3,7 @@
 The colours start from the palette of Okabe and Ito (2008), "Color universal design", which stays
 distinguishable under the common colour deficiencies; the further ones differ in lightness as well
 as in hue. Every kind has a family, and the direction and the period n choose within it.
-After its last colour a family repeats, darker, then lighter, and so on (:func:`lap`). Attractors
+After its last colour a family repeats, darker, then lighter, and so on (its lap). Attractors
 around another turn of the line are coloured likewise. A colour does not depend on the other
 attractors of a map, and no drawing library is imported.
 """
@@ -78,21 +78,14 @@ def marker(attractor: Attractor) -> str:
     shapes = _SHAPES.get(attractor.kind, "o")
     if attractor.w and f"{attractor.kind} +" in _SHADES:
         shapes = "^>" if attractor.w > 0 else "v<"
-    return shapes[lap(attractor) % len(shapes)]
+    # The lap is how often the colours of a family were repeated before this one: usually 0.
+    return shapes[_place(attractor)[1] % len(shapes)]
 
 
 def in_words(code: str) -> str:
     """Return the name of a colour ``"#rrggbb"``, or of the nearest named one."""
     apart = [np.subtract(parts(one), parts(code)) for one in _NAMES]
     return [*_NAMES.values()][int(np.argmin([gap @ gap for gap in apart]))]
-
-
-def lap(attractor: Attractor) -> int:
-    """Return how often the colours of a family were repeated before this one: usually 0.
-
-    ``oscillation 8:0`` has the colour of ``oscillation 2:0``, darkened, and the lap 1.
-    """
-    return _place(attractor)[1]
 
 
 def shades(scale: str, at: npt.ArrayLike) -> npt.NDArray[np.uint8]:

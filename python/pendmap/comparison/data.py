@@ -215,7 +215,9 @@ def average_blocks(run: FitRun) -> FitRun:
     good = weight > 0
     # Excluded blocks must not bend the curve at their neighbours.
     known = np.where(good, theta, np.interp(time, time[good], theta[good]))
-    theta = theta - 0.5 * variance * _curvature(time, known)
+    bent = np.gradient(np.gradient(known, time), time)
+    bent[:2], bent[-2:] = bent[2], bent[-3]  # at the ends that of the third block
+    theta = theta - 0.5 * variance * bent
     sigma = np.where(good, weight, np.median(weight[good])) ** -0.5
     if run.count is not None:
         parts = run.theta[: time.size * size].reshape(-1, size)
@@ -252,10 +254,3 @@ def _dense(time: Floats, theta: Floats, weight: Floats) -> bool:
     # Angular frequency of swings, or of rotations.
     rate = max(float(np.std(velocity) / np.std(theta)), float(np.quantile(np.abs(velocity), 0.99)))
     return float(np.median(steps)) * rate < math.tau / BLOCKS
-
-
-def _curvature(time: Floats, theta: Floats) -> Floats:
-    """Return second derivatives by central differences; at the ends those of the third block."""
-    bent = np.gradient(np.gradient(theta, time), time)
-    bent[:2], bent[-2:] = bent[2], bent[-3]
-    return bent

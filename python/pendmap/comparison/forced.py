@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
     from pendmap.comparison.itinerary import Steady
     from pendmap.formatting import Estimate
-    from pendmap.identification.fit import TrajectoryFit
     from pendmap.identification.runs import FitRun
     from pendmap.model import Rig
     from pendmap.records import Run
@@ -165,7 +164,10 @@ def compare_forced(
     phase = next((e for name, e in fit.estimates.items() if name.startswith("phi")), None)
     given = dataclasses.replace(given, drive=fit.drive_of(given, 0))
     _, begin, _, *start = fit.windows[0]
-    covariance = _start_covariance(fit, given)
+    first = dataclasses.replace(fit, windows=fit.windows[:1], names=())
+    _, (window,) = window_slopes(first, [given], (), fit.model)
+    inverse = np.linalg.pinv(window.states.T @ window.states, hermitian=True)
+    covariance = inverse * np.outer((1.0, fit.model.w0), (1.0, fit.model.w0))
     time, measured = _evenly(run, given, float(given.time[begin]))
     period = None if given.drive is None else math.tau / float(given.drive["Omega"] or math.nan)
     ruler = Ruler(time[1] - time[0], math.tau / model.w0, period, worth.sigma)
@@ -200,15 +202,6 @@ def compare_forced(
         steady=cycles,
         ensemble=ensemble,
     )
-
-
-def _start_covariance(fit: TrajectoryFit, run: FitRun) -> Floats:
-    """Return the covariance of angle and velocity at the beginning of a run, the only one."""
-    first = dataclasses.replace(fit, windows=fit.windows[:1], names=())
-    _, (window,) = window_slopes(first, [run], (), fit.model)
-    scale = np.array([1.0, fit.model.w0])
-    inverse = np.linalg.pinv(window.states.T @ window.states, hermitian=True)
-    return np.asarray(inverse * np.outer(scale, scale), np.float64)
 
 
 def drawn_starts(

@@ -23,6 +23,7 @@ from pendmap.identification.fit import Motion, fit_states, run_forward
 from pendmap.identification.peaks import find_peaks
 from pendmap.identification.runs import FitRun
 from pendmap.identification.table1 import errors_of
+from pendmap.signal.robust import rms
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -233,18 +234,12 @@ def compute_gap(data: DataSplit, base: Fits, best: Fits) -> Gap:
     rows = []
     for held_out, runs in enumerate((data.fitted, data.held)):
         residuals = (fits[held_out].residuals for fits in (base, best))
-        for run, *left in zip(runs, *residuals, strict=True):
-            rms_of = (_rms(run, residual) for residual in left)
+        for run, *both in zip(runs, *residuals, strict=True):
+            rms_of = (rms(residual[run.counted]) for residual in both)
             rows.append(RunGap(run.name, bool(held_out), noise_rms([run]), *rms_of))
     floors = noise_rms(data.fitted), noise_rms(data.held)
-    rms = base.fitted.rms, best.fitted.rms, base.held.rms, best.held.rms
-    return Gap(*floors, *rms, tuple(rows))
-
-
-def _rms(run: FitRun, residual: Floats) -> float:
-    """Return the root mean square residual of a run's included readings, rad."""
-    squares = residual[np.isfinite(residual) & run.counted] ** 2
-    return math.sqrt(float(np.mean(squares))) if squares.size else math.nan
+    left = base.fitted.rms, best.fitted.rms, base.held.rms, best.held.rms
+    return Gap(*floors, *left, tuple(rows))
 
 
 @dataclasses.dataclass(frozen=True)

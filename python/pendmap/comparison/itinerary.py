@@ -17,6 +17,7 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import savgol_filter
 
 from pendmap._core import Attractor
+from pendmap.signal.robust import rms
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -92,7 +93,8 @@ class Ruler(NamedTuple):
         """
         near = max(_REPEATED, _NOISES * math.sqrt(2) * self.sigma)
         if self.period is None:
-            since = _last(np.abs(reading - reading[-1]) > near) + 1
+            away = np.flatnonzero(np.abs(reading - reading[-1]) > near)
+            since = int(np.max(away, initial=-1)) + 1
             rests = (reading.size - since) * self.tick >= self.swing
             return Cycling(1, 0, since * self.tick) if rests else NEVER
         least = math.ceil(_HELD * self.period / self.tick)
@@ -105,7 +107,8 @@ class Ruler(NamedTuple):
             later = (1 - part) * reading[whole:-1] + part * reading[whole + 1 :]
             apart = later - reading[:pairs]
             turns = np.round(apart[-least:].mean() / math.tau)
-            since = _last(np.abs(apart - math.tau * turns) > near) + 1
+            away = np.flatnonzero(np.abs(apart - math.tau * turns) > near)
+            since = int(np.max(away, initial=-1)) + 1
             if pairs - since >= least:
                 return Cycling(n, int(turns), since * self.tick)
         return NEVER
@@ -124,12 +127,6 @@ def wells(reading: Floats) -> NDArray[np.int64]:
     inside = np.abs(reading - math.tau * nearest) < math.pi - _MARGIN
     inside[0] = True
     return nearest[np.maximum.accumulate(np.where(inside, np.arange(reading.size), 0))]
-
-
-def _last(true: NDArray[np.bool_]) -> int:
-    """Return the last true index, -1 if there is none."""
-    places = np.flatnonzero(true)
-    return int(places[-1]) if places.size else -1
 
 
 @dataclasses.dataclass(frozen=True)
@@ -190,12 +187,8 @@ class Cycle:
             theta = np.concatenate([self.theta[at:], self.theta[:at] + math.tau * self.w])
             theta += math.tau * round(float(np.mean(other.theta - theta)) / math.tau)
             shifted = dataclasses.replace(self, theta=theta, velocity=np.roll(self.velocity, -at))
-            pairs.append((_rms(theta - other.theta), shifted))
+            pairs.append((rms(theta - other.theta), shifted))
         return min(pairs, key=lambda pair: pair[0])
-
-
-def _rms(values: Floats) -> float:
-    return math.sqrt(float(np.mean(values**2)))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -234,10 +227,10 @@ def steady_state(
     """
     measured, cycles = _folded(time, reading, period, last)
     pairs = [end.cycle.nearest(measured) for end in ends]
-    rms, model = min(pairs, key=lambda pair: pair[0], default=(math.inf, measured))
-    if math.isinf(rms):
+    apart, model = min(pairs, key=lambda pair: pair[0], default=(math.inf, measured))
+    if math.isinf(apart):
         return Steady(measured, cycles, ends, None, math.nan, math.nan)
-    return Steady(measured, cycles, ends, model, rms, _rms(model.velocity - measured.velocity))
+    return Steady(measured, cycles, ends, model, apart, rms(model.velocity - measured.velocity))
 
 
 def _folded(time: Floats, reading: Floats, period: float, last: Cycling) -> tuple[Cycle, int]:
@@ -254,7 +247,7 @@ def _folded(time: Floats, reading: Floats, period: float, last: Cycling) -> tupl
     rows = CubicSpline(time, reading)(begins[:, None] + at) - turns[:, None]
     while count > 1:  # only the last cycles while a transient decays
         early, late = rows[: count // 2].mean(axis=0), rows[count // 2 :].mean(axis=0)
-        if _rms(late - early) < _STEADY:
+        if rms(late - early) < _STEADY:
             break
         rows = rows[count - count // 2 :]
         count //= 2

@@ -223,17 +223,14 @@ def list_candidates(
         if entry.group == "drive" and not driven:
             continue
         waves = {e.name for e in entry.parameters if e.role == "order"}
-        shapes = [s for s in _shapes(entry) if all(math.tau <= s[n] * reach for n in waves)]
+        varied = [e for e in entry.parameters if e.is_shape]
+        fixed = {e.name: e.middle for e in varied}
+        # At most one parameter is scanned.
+        shapes = [fixed | {e.name: float(v)} for e in varied[:1] for v in _scan(e)] or [fixed]
+        shapes = [s for s in shapes if all(math.tau <= s[n] * reach for n in waves)]
         if shapes:
             candidates.append([Candidate(name, shape, formulas.get(name)) for shape in shapes])
     return candidates
-
-
-def _shapes(entry: EffectDefinition) -> list[dict[str, float]]:
-    """Return the shapes of an effect, with at most one scanned parameter."""
-    shapes = [e for e in entry.parameters if e.is_shape]
-    fixed = {e.name: e.middle for e in shapes}
-    return [fixed | {e.name: float(value)} for e in shapes[:1] for value in _scan(e)] or [fixed]
 
 
 def _scan(entry: EffectParameter) -> Floats:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import math
 from typing import TYPE_CHECKING, Any
@@ -30,13 +29,13 @@ from pendmap.residuals.by_run import parameters_by_run
 from pendmap.residuals.torque import Torque, outstanding_bins, residual_torque
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterator, Sequence
+    from collections.abc import Callable, Collection, Sequence
     from typing import Unpack
 
     from numpy.typing import ArrayLike
 
     from pendmap.model import Formula, Rig
-    from pendmap.records import ByHand, Experiment
+    from pendmap.records import ByHand
     from pendmap.records.read import Records
 
 _FITS = 10  # Fits that are half of the work; a diagnosis makes 15 or more
@@ -110,7 +109,7 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
     formulas = checked_own(effects)
     check_whole("max_effects", max_effects, 0, 6)
     moved = in_rounds(progress, _FITS) or (lambda _done, _total: None)
-    with _refuse_divergence(experiment):
+    try:
         data, base, core = fit_followed(split_records(experiment), model, without)
         moved(1, 1)
         most = 0 if "rigs-differ" in doubt_keys(experiment) else max_effects
@@ -143,6 +142,11 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
             # An effect whose interval contains 0 is no name: the last one found is left out.
             weakest = next(c for c in reversed(last.chosen) if c.name in doubtful)
             last = state.leave_out(last, weakest)
+    except FitDiverged as error:
+        raise InputError(
+            f"{experiment.path}: no model can be fitted to these records: {error}. A forced run "
+            'must have kind = "forced" and its drive in an experiment.toml'
+        ) from None
     best = nearest if claimed else begin
     if not settles(state.data, best.fitted):
         raise InputError(
@@ -185,18 +189,6 @@ def diagnose(  # noqa: PLR0913 (each is asked for by name)
     )
 
 
-@contextlib.contextmanager
-def _refuse_divergence(experiment: Experiment) -> Iterator[None]:
-    """Convert FitDiverged into InputError with the path of the experiment."""
-    try:
-        yield
-    except FitDiverged as error:
-        raise InputError(
-            f"{experiment.path}: no model can be fitted to these records: {error}. A forced run "
-            'must have kind = "forced" and its drive in an experiment.toml'
-        ) from None
-
-
 def diagnosed_model(diagnosis: Discrepancy, command: str = "") -> Rig:
     """Return the model of a diagnosis with the notes for its file.
 
@@ -216,18 +208,13 @@ def diagnosed_model(diagnosis: Discrepancy, command: str = "") -> Rig:
         The best model, with its notes.
     """
     runs = [diagnosis.data.runs[k] for k in dict.fromkeys(diagnosis.data.fitted_of)]
-    sha256 = diagnosis.data.experiment.sha256
-    files = {run.file: run.sha256 or sha256.get(run.file, "") for run in runs}
-    notes: dict[str, Any] = {
-        "provenance": provenance(
-            files, command, rms=diagnosis.gap.after, noise=diagnosis.gap.noise_floor
-        )
-        | {
-            "method": "diagnose",
-            "verdict": diagnosis.verdict,
-            "held_out": list(dict.fromkeys(run.name for run in diagnosis.data.held)),
-        }
+    gap, experiment = diagnosis.gap, diagnosis.data.experiment
+    origin = provenance(experiment, runs, command, rms=gap.after, noise=gap.noise_floor) | {
+        "method": "diagnose",
+        "verdict": diagnosis.verdict,
+        "held_out": list(dict.fromkeys(run.name for run in diagnosis.data.held)),
     }
     if diagnosis.best.fitted.zeroed:
-        notes["provenance"]["set_to_zero"] = list(diagnosis.best.fitted.zeroed)
-    return dataclasses.replace(diagnosis.model, notes={**diagnosis.model.notes, **notes})
+        origin["set_to_zero"] = list(diagnosis.best.fitted.zeroed)
+    notes = {**diagnosis.model.notes, "provenance": origin}
+    return dataclasses.replace(diagnosis.model, notes=notes)

@@ -104,11 +104,6 @@ class FittedModel:
             start |= {n: start[n] - m for n, m in zip(self.fit.names, moved, strict=True)}
         return {name: value for name, value in start.items() if name not in names}
 
-    def shape_of(self, candidate: Candidate) -> dict[str, float]:
-        """Return the fitted shape of an effect, SI."""
-        fitted = {effect.name: effect.parameters for effect in self.fit.model.effects}
-        return {name: fitted[candidate.name][name] for name in candidate.shape}
-
     @property
     def adapted(self) -> int:
         """Number of adapted parameters, with scanned shapes and coefficients fixed at 0."""

@@ -21,6 +21,7 @@ from pendmap.comparison.forecast import (
 from pendmap.diagnosis.advice import Advice, advise
 from pendmap.diagnosis.named import NamedEffect, effect_values
 from pendmap.diagnosis.table import HEAD, NOTE, Standings
+from pendmap.files.toml import packaged
 from pendmap.formatting import Estimate
 from pendmap.identification.report import in_line
 from pendmap.identification.results import FitResult, Followed
@@ -46,15 +47,7 @@ if TYPE_CHECKING:
     from pendmap.residuals.torque import Torque
 
 
-SAID: Final = {
-    "none": "the baseline describes the records to within their noise",
-    "named": "the effects found explain the whole gap",
-    "partial": "the effects found close part of the gap, and significant residuals remain: their "
-    "form is only approximate, or a further effect is missing",
-    "ambiguous": "several effects explain the gap equally well; these records do not distinguish "
-    "them",
-    "unknown": "something is missing that no candidate explains; no name is claimed",
-}
+SAID: Final[dict[str, str]] = packaged("report/json_keys.toml")["verdicts"]
 """Meaning of each verdict, in the summary and in the report."""
 
 TORQUE: Final = unit_of("torque")  # Unit of a torque per moment of inertia

@@ -152,7 +152,9 @@ def _attempt(
     accepted = gains and state.keeps_hold_out(best, full)
     scores, losses = state.scores(reduced), state.hold_out_losses
     names = tuple(scores.name(k) for k in places)
-    shape = full.shape_of(full.chosen[-len(names)])
+    first = full.chosen[-len(names)]
+    effect = next(e for e in full.fit.model.effects if e.name == first.name)
+    shape = {name: effect.parameters[name] for name in first.shape}
     score = scores.together(places) / state.level
     fall = state.cost(reduced) - state.cost(full)
     pairs = zip(losses(reduced), losses(full), strict=False) if gains else ()

@@ -11,6 +11,7 @@ from pendmap.formatting import estimate_text, interval
 from pendmap.identification.parameters import OPPOSING
 from pendmap.identification.peaks import viscous_work
 from pendmap.identification.uncertainty import computed_from
+from pendmap.model.labels import QUANTITIES
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -20,19 +21,6 @@ if TYPE_CHECKING:
     from pendmap.signal import Floats
 
 DRAG: Final = "quadratic_drag.q"
-QUANTITIES: Final[dict[str, tuple[str, str, str]]] = {
-    "frequency_hz": ("Hz", "f = {} Hz", "frequency of small swings"),
-    "period_s": ("s", "period {} s", "period of small swings"),
-    "zeta": ("1", "viscous: zeta = {}", "damping ratio of the viscous damping alone"),
-    "log_decrement": ("1", "log decrement {}", "logarithmic decrement by viscous damping alone"),
-    "time_constant_s": ("s", "time constant {} s", "1/e time by viscous damping alone"),
-    "Q": ("1", "Q = {} at {:.3g} rad, of all losses", "quality factor at q_amplitude_rad"),
-    "dead_band_rad": ("rad", "dead band {} rad", "angle to which friction holds the pendulum"),
-    "dead_band_deg": ("degrees", "{} degrees", "the same angle"),
-    "friction_n_m": ("N m", "friction {} N m", "torque of the Coulomb friction"),
-    "viscous_n_m_s": ("N m s", "viscous {} N m s", "torque of the viscous damping per velocity"),
-}
-"""Unit, text and meaning of each quantity."""
 LINES: Final = ((0, 2), (2, 5), (5, 8), (8, 10))  # Quantities of each line of text
 
 

@@ -37,7 +37,7 @@ from pendmap.records.summary import UNIT_FINDINGS, doubt_keys
 from pendmap.signal.robust import from_first
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Sequence
     from typing import Unpack
 
     from numpy.typing import ArrayLike
@@ -248,20 +248,23 @@ def identified_model(report: IdentificationReport, command: str = "") -> Rig:
         was not fitted.
     """
     best = report.best
-    sha256 = report.experiment.sha256
-    files = {run.file: run.sha256 or sha256.get(run.file, "") for run in report.runs}
     rms = noise = None
     if report.joint is not None and best.method == BEST:
         rms, noise = report.joint.fit.rms, report.joint.noise
-    notes = {"provenance": provenance(files, command, rms=rms, noise=noise)}
-    notes["provenance"]["method"] = best.method
+    origin = provenance(report.experiment, report.runs, command, rms=rms, noise=noise)
+    notes = {"provenance": origin | {"method": best.method}}
     with named(f"{report.run.name}: the result is no valid model"):
         model = report.model
         return dataclasses.replace(model, notes={**model.notes, **notes})
 
 
 def provenance(
-    files: Mapping[str, str], command: str, *, rms: float | None = None, noise: float | None = None
+    experiment: Experiment,
+    runs: Iterable[Run],
+    command: str,
+    *,
+    rms: float | None = None,
+    noise: float | None = None,
 ) -> dict[str, Any]:
     """Return the table ``[provenance]`` of a model file from records and their SHA-256.
 
@@ -272,4 +275,5 @@ def provenance(
     if command:
         table["command"] = command
     table |= {name: x for name, x in (("rms", rms), ("noise", noise)) if x is not None}
+    files = {run.file: run.sha256 or experiment.sha256.get(run.file, "") for run in runs}
     return table | {"records": [{"file": name, "sha256": code} for name, code in files.items()]}

@@ -12,7 +12,6 @@ import numpy as np
 from scipy.special import ellipk
 
 from pendmap.identification.turning import End, release, rough_damping
-from pendmap.records.resolution import levels_shared
 from pendmap.signal.local_polynomial import fit_around
 
 if TYPE_CHECKING:
@@ -115,7 +114,9 @@ class Finder:
         if self.count <= 2 * self.sigma:
             return self.sigma
         inside = self._between(fit.centre - fit.half, fit.centre + fit.half)
-        return self.sigma * levels_shared(self.theta[inside], self.count)
+        # Each level is worth three readings.
+        levels = max(np.unique(np.round(self.theta[inside] / self.count)).size, 1)
+        return self.sigma * math.sqrt(max((inside.stop - inside.start) / (3 * levels), 1.0))
 
     def _clipped(self, k: int) -> End | None:
         """Return a clipped peak, at the extreme for longer than a swing would be; or None."""

@@ -10,10 +10,11 @@ import numpy as np
 
 from pendmap.errors import InputError
 from pendmap.formatting import counted, estimate_text, interval, percent
-from pendmap.identification.engineering import QUANTITIES, lines_of, quantities, swing_amplitude
+from pendmap.identification.engineering import lines_of, quantities, swing_amplitude
 from pendmap.identification.methods.trajectory import DRAG, UNFIT, identification_of
-from pendmap.identification.parameters import OFFSET, SENSOR
+from pendmap.identification.parameters import OFFSET, OPPOSING, SENSOR
 from pendmap.identification.results import FitResult, Followed
+from pendmap.model.labels import LABELS, QUANTITIES
 from pendmap.records.summary import doubts, finding_lines
 
 if TYPE_CHECKING:
@@ -39,9 +40,6 @@ COLUMNS: Final = {
     "offset": "offset (rad)",
 }
 """Columns of the table of methods and their headers; effects' parameters follow."""
-
-SHORT: Final = {"w0": ("w0", "rad/s"), "c_over_m": ("c/m", "1/s"), "Tr": ("Tr", "rad/s^2")}
-"""Symbols and units of the parameters that are said first."""
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -266,9 +264,8 @@ def as_json(report: IdentificationReport) -> dict[str, Any]:
         "table1_left_out": report.table.left_out or None,
         "not_simulated": dict(report.table.lost),
         "rms": None if report.joint is None else report.joint.fit.rms,
-        "with_drag": None
-        if report.with_drag is None
-        else {
+        "with_drag": report.with_drag
+        and {
             "rms": report.with_drag.fit.rms,
             "parameters": {n: e.value for n, e in report.with_drag.fit.estimates.items()},
         },
@@ -356,8 +353,8 @@ def in_short(report: IdentificationReport) -> Iterator[str]:
 def in_line(known: Mapping[str, Estimate]) -> str:
     """Return the parameters that are said first, with symbols and units."""
     return ", ".join(
-        f"{symbol} = {estimate_text(known[name])} {unit}"
-        for name, (symbol, unit) in SHORT.items()
+        f"{LABELS[name].symbol} = {estimate_text(known[name])} {LABELS[name].unit}"
+        for name in ("w0", *OPPOSING)
         if name in known
     )
 

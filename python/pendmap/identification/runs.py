@@ -115,17 +115,11 @@ def bare_run(run: FitRun, rig: Rig, units: Units) -> dict[str, Any]:
         "count": run.count,
         "longest": float(units.bare(longest, -1)),
         "pivot": None if run.pivot is None else _bare_pivot(run.pivot, rig, units),
-        "rod_sensor": _bare_sensor(run, units),
-    }
-
-
-def _bare_sensor(run: FitRun, units: Units) -> dict[str, Any] | None:
-    sensor = run.rod_sensor
-    if sensor is None:
-        return None
-    return {
-        "rate": float(units.given(sensor.rate, 1)),
-        "angle": np.ascontiguousarray(sensor.angle, np.float64),
+        "rod_sensor": run.rod_sensor
+        and {
+            "rate": float(units.given(run.rod_sensor.rate, 1)),
+            "angle": np.ascontiguousarray(run.rod_sensor.angle, np.float64),
+        },
     }
 
 

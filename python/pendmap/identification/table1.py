@@ -10,6 +10,7 @@ import numpy as np
 
 from pendmap.analysis.trajectory import simulate
 from pendmap.errors import InputError
+from pendmap.signal.robust import rms
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -61,12 +62,12 @@ class PeakErrors:
     @property
     def period_rms(self) -> float:
         """Root mean square of the period errors, percent; NaN if there are none."""
-        return _rms(self.period_error)
+        return rms(self.period_error)
 
     @property
     def peak_rms(self) -> float:
         """Root mean square of the peak errors, percent; NaN if there are none."""
-        return _rms(self.peak_error)
+        return rms(self.peak_error)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -92,11 +93,6 @@ class Table1:
     errors: Mapping[str, PeakErrors]
     left_out: str = ""
     lost: Mapping[str, str] = dataclasses.field(default_factory=dict)
-
-
-def _rms(errors: Floats) -> float:
-    known = errors[np.isfinite(errors)]
-    return float(np.sqrt(np.mean(known**2))) if known.size else math.nan
 
 
 def first_state(peaks: Peaks) -> State:

@@ -24,7 +24,11 @@ class Label(NamedTuple):
     meaning: str
 
 
-LABELS: Final = {name: Label(*about) for name, about in packaged("model/labels.toml").items()}
+_TABLES: Final = packaged("model/labels.toml")
+QUANTITIES: Final[dict[str, tuple[str, str, str]]] = _TABLES.pop("quantities")
+"""Unit, text and meaning of each quantity that follows from identified parameters."""
+MATHTEXT: Final[dict[str, str]] = _TABLES.pop("mathtext")  # Form of the symbols of charts
+LABELS: Final = {name: Label(*about) for name, about in _TABLES.items()}
 """Parameters of a :class:`pendmap.Rig` in SI, of a sensor, and of a :class:`pendmap.Pendulum`."""
 
 

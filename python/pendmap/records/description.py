@@ -9,8 +9,15 @@ import dataclasses
 import math
 from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar
 
-from pendmap.errors import InputError, check_flag, check_keys, check_number, check_whole, short_repr
-from pendmap.tables.text import Reader
+from pendmap.errors import (
+    InputError,
+    check_flag,
+    check_keys,
+    check_number,
+    check_whole,
+    short_repr,
+)
+from pendmap.tables.text import Reader, ruled
 from pendmap.tables.units import CHANNELS, PIVOT_UNITS, spelling
 
 if TYPE_CHECKING:
@@ -28,54 +35,49 @@ POSITIVE: Final = (1 / LARGEST, LARGEST)
 RATES: Final = (1e-3, 1e9)  # Sampling rates, Hz
 
 
-def _key(rule: object, default: Any = None) -> Any:  # noqa: ANN401 (of any type)
-    """Return a field whose value in the file follows a rule of :func:`checked`."""
-    return dataclasses.field(default=default, metadata={"rule": rule})
-
-
 @dataclasses.dataclass(frozen=True)
 class Rig:
     """``[rig]``: what is known of the rig."""
 
-    gravity: float | None = _key(POSITIVE)
-    length_m: float | None = _key(POSITIVE)
-    w0: float | None = _key(POSITIVE)
-    encoder_counts: int | None = _key(range(1, 10**9))
-    inertia: float | None = _key(POSITIVE)  # about the pivot, kg m^2
-    mass: float | None = _key(POSITIVE)  # kg
-    length: float | None = _key(POSITIVE)  # of the pivot from the centre of mass, m
+    gravity: float | None = ruled(POSITIVE)
+    length_m: float | None = ruled(POSITIVE)
+    w0: float | None = ruled(POSITIVE)
+    encoder_counts: int | None = ruled(range(1, 10**9))
+    inertia: float | None = ruled(POSITIVE)  # about the pivot, kg m^2
+    mass: float | None = ruled(POSITIVE)  # kg
+    length: float | None = ruled(POSITIVE)  # of the pivot from the centre of mass, m
 
 
 @dataclasses.dataclass(frozen=True)
 class Column:
     """Column of a channel; edge of a trigger."""
 
-    name: str | int | None = _key(COLUMN)  # heading, or number from 1
-    unused: bool = _key(bool, default=False)  # no column has this channel
-    unit: str | None = _key(str)
-    scale: float | None = _key(NUMBER)  # SI unit per unit of the column
-    zero: float = _key(NUMBER, 0.0)  # in the unit of the column
-    edge: str | None = _key(["rising", "falling"])
+    name: str | int | None = ruled(COLUMN)  # heading, or number from 1
+    unused: bool = ruled(bool, default=False)  # no column has this channel
+    unit: str | None = ruled(str)
+    scale: float | None = ruled(NUMBER)  # SI unit per unit of the column
+    zero: float = ruled(NUMBER, 0.0)  # in the unit of the column
+    edge: str | None = ruled(["rising", "falling"])
 
 
 @dataclasses.dataclass(frozen=True)
 class Drive:
     """Drive ``a(t) = p cos(Omega t + phi)``; a ``phi`` of None is fitted."""
 
-    p: float = _key(NUMBER, dataclasses.MISSING)
-    Omega: float = _key(POSITIVE, dataclasses.MISSING)
-    phi: float | None = _key(NUMBER)
+    p: float = ruled(NUMBER, dataclasses.MISSING)
+    Omega: float = ruled(POSITIVE, dataclasses.MISSING)
+    phi: float | None = ruled(NUMBER)
 
 
 @dataclasses.dataclass(frozen=True)
 class Pivot:
     """Columns of the pivot's motion, their unit, and their factor and sign."""
 
-    vertical: str | None = _key(str)
-    horizontal: str | None = _key(str)
-    unit: str | None = _key([*PIVOT_UNITS])
-    scale: float = _key(POSITIVE, 1.0)
-    sign: float = _key([1, -1], 1.0)
+    vertical: str | None = ruled(str)
+    horizontal: str | None = ruled(str)
+    unit: str | None = ruled([*PIVOT_UNITS])
+    scale: float = ruled(POSITIVE, 1.0)
+    sign: float = ruled([1, -1], 1.0)
 
 
 # What a table is like, for messages
@@ -89,14 +91,14 @@ EXAMPLES: Final[Mapping[type, str]] = {
 class RunPlan:
     """Fields of one ``[[run]]``."""
 
-    file: str = _key(str, dataclasses.MISSING)
-    kind: Kind = _key(["free", "forced"], "free")  # noqa: RUF009
-    lab_time_s: float = _key(NUMBER, 0.0)
-    from_s: float = _key(NUMBER, -math.inf)
-    to_s: float = _key(NUMBER, math.inf)
-    hold_out: bool = _key(bool, default=False)
-    drive: Drive | None = _key(Drive)  # noqa: RUF009
-    pivot: Pivot | None = _key(Pivot)  # noqa: RUF009
+    file: str = ruled(str, dataclasses.MISSING)
+    kind: Kind = ruled(["free", "forced"], "free")  # noqa: RUF009
+    lab_time_s: float = ruled(NUMBER, 0.0)
+    from_s: float = ruled(NUMBER, -math.inf)
+    to_s: float = ruled(NUMBER, math.inf)
+    hold_out: bool = ruled(bool, default=False)
+    drive: Drive | None = ruled(Drive)  # noqa: RUF009
+    pivot: Pivot | None = ruled(Pivot)  # noqa: RUF009
 
 
 @dataclasses.dataclass(frozen=True)

@@ -16,9 +16,8 @@ import numpy as np
 
 from pendmap.formatting import counted, moment
 from pendmap.records.by_hand import by_hand
-from pendmap.records.scale import GAIN_KNOWN, gain_of
+from pendmap.records.scale import GAIN_KNOWN, LARGEST_SWING, gain_interval, swings_about
 from pendmap.signal.local_polynomial import local_fit
-from pendmap.signal.robust import even_times
 
 if TYPE_CHECKING:
     from pendmap.records.work import Work
@@ -66,10 +65,12 @@ def gain(work: Work) -> Finding | None:
     """Report swings too small to determine the gain of the sensor."""
     free = work.free and not work.integrated
     good = work.trusted
-    interval = gain_of(work.time[good], work.theta[good], work.count) if free else None
-    if interval is None or interval[1] - interval[0] <= 2 * GAIN_KNOWN:
+    periods = swings_about(work.time[good], work.theta[good], work.count) if free else None
+    if periods is None or float(np.max(periods.amplitude)) > LARGEST_SWING:
         return None
-    low, high = interval
+    low, high = gain_interval(periods)
+    if high - low <= 2 * GAIN_KNOWN:
+        return None
     between = f"{low:.2g} to {high:.2g}" if math.isfinite(high) else f"{low:.2g} or more"
     return work.finding("gain-unknown", between=between)
 
@@ -91,12 +92,6 @@ def step_of(theta: Floats) -> float:
     turns = np.exp(2j * np.pi * (values - values[0]) / step)
     away = np.angle(turns / np.mean(turns)) / (2 * np.pi)
     return step if float(np.sqrt(np.mean(away**2))) < ON_STEPS else 0.0
-
-
-def levels_shared(theta: Floats, step: float) -> float:
-    """Return the factor on the noise of a mean by steps, each worth three readings."""
-    levels = np.unique(np.round(theta / step)).size
-    return math.sqrt(max(theta.size / (3 * max(levels, 1)), 1.0))
 
 
 def logs_edges(theta: Floats) -> bool:
@@ -151,9 +146,11 @@ def pivot_steps(work: Work) -> Finding | None:
     known = all(np.isfinite(values).all() for values in work.pivot.values())
     if not order or work.time.size < 20 or not known:
         return None
-    interval, even = even_times(work.time)
-    if not even.size:
+    interval = float(np.median(np.diff(work.time)))
+    count = math.floor((work.time[-1] - work.time[0]) / interval) + 1
+    if count > 10 * work.time.size:  # gaps are long
         return None
+    even = work.time[0] + interval * np.arange(count)
     longest, places = 0, {}
     for way, values in work.pivot.items():
         places[way] = np.interp(even, work.time, values)

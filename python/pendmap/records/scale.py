@@ -119,14 +119,6 @@ def share_of(periods: Periods, grown: Floats) -> tuple[float, float]:
     return float(answer[1] / answer[0]), float(spread[1] / answer[0])
 
 
-def gain_of(time: Floats, theta: Floats, count: float) -> tuple[float, float] | None:
-    """Return the 95 % interval of reading over angle from the periods of a free run, or None."""
-    periods = swings_about(time, theta, count)
-    if periods is None or float(np.max(periods.amplitude)) > LARGEST_SWING:
-        return None
-    return gain_interval(periods)
-
-
 def gain_interval(periods: Periods) -> tuple[float, float]:
     """Return the 95 % interval of reading over angle from periods."""
     share, error = share_of(periods, growth(periods.amplitude))

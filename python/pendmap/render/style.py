@@ -18,6 +18,7 @@ from matplotlib.textpath import TextPath
 
 from pendmap.errors import InputError
 from pendmap.files import whole_file
+from pendmap.model.labels import MATHTEXT
 
 if TYPE_CHECKING:
     import os
@@ -45,20 +46,7 @@ DRAWING: Final = threading.RLock()
 """Held while a figure is made, drawn or written: matplotlib and its settings have no threads."""
 
 SYMBOLS: Final = {
-    "E / (m g l)": "$E/(mgl)$",
-    "d²θ/dt²": "$d^2θ/dt^2$",
-    "dθ/dτ": "$dθ/dτ$",
-    "dθ/dt": "$dθ/dt$",
-    "θr": "$θ_r$",
-    "w0": "$ω_0$",
-    "c/m": "$c/m$",
-    "Tr": "$T_r$",
-    "α²": "$α^2$",
-    "YΩ²/g": "$YΩ^2/g$",
-    "p/ω²": "$p/ω^2$",
-    "1/ω²": "$1/ω^2$",
-    "Y/l": "$Y/l$",
-    "δx": "$δx$",
+    **MATHTEXT,
     **{letter: f"${letter}$" for letter in "θτγωΩφζλδ"},
     **{letter: f"${letter}$" for letter in "ptelEYfQ"},
 }

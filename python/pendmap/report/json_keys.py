@@ -11,8 +11,7 @@ from typing import Any, Final
 
 from pendmap.files.saved import COLUMNS
 from pendmap.files.toml import packaged
-from pendmap.identification.engineering import QUANTITIES
-from pendmap.model.labels import LABELS
+from pendmap.model.labels import LABELS, QUANTITIES
 
 Keys = dict[str, tuple[str, str]]  # Unit and meaning by path; paths of one meaning have commas
 

@@ -79,7 +79,10 @@ class Torque:
 
 def residual_torque(runs: Sequence[FitRun], fit: TrajectoryFit, noise: ResidualNoise) -> Torque:
     """Return the residual torque of a model in the runs to which it is fitted."""
-    windows, places = window_derivatives(runs, fit)
+    # Derivatives also at samples without weight.
+    whole = [dataclasses.replace(run, trusted=None) for run in runs]
+    windows = window_slopes(fit, whole, (), fit.model)[1]
+    places = [_places(runs[w.run], fit, w) for w in windows]
     edges: dict[str, Floats] = {}
     for name in OVER:
         values = np.concatenate([place[name] for place in places])
@@ -112,15 +115,6 @@ def residual_torque(runs: Sequence[FitRun], fit: TrajectoryFit, noise: ResidualN
             rows[name].append(row | {"z": row["torque"] / row["stderr"] if row["stderr"] else 0.0})
         first = part.stop
     return Torque(noise, rows, gains)
-
-
-def window_derivatives(
-    runs: Sequence[FitRun], fit: TrajectoryFit
-) -> tuple[list[WindowSlopes], list[dict[str, Floats]]]:
-    """Return derivatives and quantities of OVER in each window, also at samples without weight."""
-    whole = [dataclasses.replace(run, trusted=None) for run in runs]
-    _, windows = window_slopes(fit, whole, (), fit.model)
-    return windows, [_places(runs[w.run], fit, w) for w in windows]
 
 
 def project_out(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -20,6 +19,12 @@ LONG_INTERVAL: Final = 1.6  # Interval, in median intervals, above which samples
 SCATTERED_STAMPS: Final = 0.1  # Scatter, in median intervals, above which stamps are averaged
 STAMPS_BESIDE: Final = 8  # Stamps on each side of a gap whose means are compared
 CERTAIN_GAP: Final = 4.0  # Step of these means above which it is a gap, standard deviations
+
+
+def rms(values: Floats) -> float:
+    """Return the root mean square of the finite values; nan if there are none."""
+    known = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(known**2))) if known.size else np.nan
 
 
 def normal_scale(values: Floats) -> float:
@@ -77,13 +82,6 @@ def span(time: Floats) -> str:
     """Return the time span of a record as text."""
     first, last = (f"{round(float(t), 4):.15g}" for t in (time[0], time[-1]))
     return f"{first} to {last} s"
-
-
-def even_times(time: Floats) -> tuple[float, Floats]:
-    """Return the median interval of a record, s, and even times over it; none if gaps are long."""
-    interval = float(np.median(np.diff(time)))
-    count = math.floor((time[-1] - time[0]) / interval) + 1
-    return interval, time[0] + interval * np.arange(count if count <= 10 * time.size else 0)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -9,17 +9,14 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendmap.files.toml import packaged
+
 if TYPE_CHECKING:
     import pandas as pd
 
     from pendmap.signal import Floats, Indices, Mask
 
-_NOTHING: Final = frozenset(
-    (
-        *("", "nan", "na", "n/a", "null", "none", "-", "--", "inf", "+inf", "-inf", "infinity"),
-        *("---", "#n/a", "#div/0!", "#name?", "#null!", "#num!", "#ref!", "#value!"),  # of Excel
-    )
-)
+_NOTHING: Final = frozenset(packaged("tables/words.toml")["nothing"])
 # Words that loggers write for the levels of a trigger
 _LEVELS: Final = {"true": 1.0, "high": 1.0, "on": 1.0, "false": 0.0, "low": 0.0, "off": 0.0}
 _PLAIN: Final = {

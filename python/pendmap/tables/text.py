@@ -53,7 +53,7 @@ _SET: Final = re.compile(r"(?<=[0-9])[\u00a0\u2009\u202f](?=[0-9]{3}(?![0-9]))")
 _SIGNS: Final = str.maketrans("\u2212\u2013\u00a0\u2009\u202f，；：（）", "--   ,;:()")
 
 
-def _key(rule: object, default: object = None) -> Any:  # noqa: ANN401 (of any type)
+def ruled(rule: object, default: object = None) -> Any:  # noqa: ANN401 (of any type)
     """Return a field whose value in ``experiment.toml`` follows a rule."""
     return dataclasses.field(default=default, metadata={"rule": rule})
 
@@ -62,9 +62,9 @@ def _key(rule: object, default: object = None) -> Any:  # noqa: ANN401 (of any t
 class Reader:
     """Format of the files, as far as it cannot be inferred from them."""
 
-    delimiter: str | None = _key(str)
-    decimal: str | None = _key([".", ","])
-    skip_rows: int = _key(range(1_000_000), 0)
+    delimiter: str | None = ruled(str)
+    decimal: str | None = ruled([".", ","])
+    skip_rows: int = ruled(range(1_000_000), 0)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -50,12 +50,7 @@ _SHORTEST_STEM: Final = 3
 _SHORTEST_PART: Final = 4  # Shortest part of a compound, letters, but for Chinese
 _SIGNS: Final = str.maketrans("˚º∘ł（）［］【】：´’′`μµ−⋅·*", "°°°l()[][]:''''uu-...")
 _MARKS: Final = ((r"([α-ω])\u0308", r"\1 ddot"), (r"([α-ω])\u0307", r"\1 dot"))
-_DERIVATIVES: Final = (
-    (r"\bd\^?2\s*\(?([^\W\d_]+)\)?\s*/\s*d\s*t\s*\^?2", r"\1 ddot"),
-    (r"\bd\s*\(?([^\W\d_]+)\)?\s*/\s*d\s*t\b", r"\1 dot"),
-    (r"([α-ω]|theta|phi)'", r"\1 dot"),
-    (r"\(\s*t\s*\)", " "),
-)
+_DERIVATIVES: Final[list[list[str]]] = _TABLES["derivatives"]
 _BRACKETS: Final = re.compile(r"\s*/?\s*[\(\[\{]([^()\[\]{}]*)[\)\]\}]")
 _CAMEL: Final = r"(?<=[a-z])(?=[A-Z])"
 _BREAKS: Final = re.compile(rf"\s*[/,;:]\s*|(?:[\s_]+(?:in|en|em|w)[\s_]+)|[\s_]+|{_CAMEL}")

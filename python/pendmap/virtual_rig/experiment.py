@@ -233,11 +233,16 @@ def make(request: Request) -> Experiment:
         for name in ("lab_time", "p", "frequency", "phase")
     )
     equation = Equation(parameters, Drive.harmonic(*harmonic), lab, others)
-    paths = _integrate(equation, plans, readings)
-    if preset.until_rest and request.duration is None and not request.plans:
-        plans = [_until_rest(*pair) for pair in zip(plans, paths, strict=True)]
+    ends = [max(_true(np.array([plan.duration]), readings)[0], 0.0) for plan in plans]
+    theta, velocity = np.array([(plan.theta, plan.velocity) for plan in plans], float).T
+    paths = integrate(equation, np.array(ends), theta, velocity)
     runs = []
-    for k, (plan, path) in enumerate(zip(plans, paths, strict=True)):
+    stops = preset.until_rest and request.duration is None and not request.plans
+    for k, (planned, path) in enumerate(zip(plans, paths, strict=True)):
+        plan = planned
+        if stops and path.events and path.events[-1].what == "stick":
+            last = float(math.ceil(path.events[-1].time + _AFTER_REST))
+            plan = dataclasses.replace(plan, duration=min(plan.duration, last))
         times = sensor.times(plan.duration)
         instants = sensor.instants(times, request.stream(_SENSOR, k, 1))
         reading = read(path, _true(instants, readings), readings)
@@ -266,24 +271,11 @@ def _lasting(plans: list[RunPlan], duration: float) -> list[RunPlan]:
     return result
 
 
-def _integrate(equation: Equation, plans: list[RunPlan], readings: list[Effect]) -> list[Path]:
-    ends = [max(_true(np.array([plan.duration]), readings)[0], 0.0) for plan in plans]
-    theta, velocity = np.array([(plan.theta, plan.velocity) for plan in plans], float).T
-    return integrate(equation, np.array(ends), theta, velocity)
-
-
 def _true(time: Floats, readings: list[Effect]) -> Floats:
     """Return the true times of samples recorded at ``time``."""
     for effect in readings:
         time = effect.clock(time)
     return time
-
-
-def _until_rest(plan: RunPlan, path: Path) -> RunPlan:
-    if not path.events or path.events[-1].what != "stick":
-        return plan
-    end = math.ceil(path.events[-1].time + _AFTER_REST)
-    return dataclasses.replace(plan, duration=min(plan.duration, float(end)))
 
 
 PARAMETERS: Final = Parameters(w0=6.2, c_over_m=2 * 0.004 * 6.2, friction=0.08)

@@ -7,9 +7,9 @@ import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from scipy.signal import lfilter
 
 from pendmap.errors import InputError
-from pendmap.virtual_rig.effects.readings import first_order_filter
 
 if TYPE_CHECKING:
     from numpy.random import Generator
@@ -82,7 +82,7 @@ class Sensor:
         lengths = rng.integers(1, _LONGEST_GAP, count, endpoint=True)
         if self.correlation:
             white[1:] *= math.sqrt(1 - self.correlation**2)
-            white = first_order_filter(white, self.correlation)
+            white = lfilter([1.0], [1.0, -self.correlation], white)
         value = reading + self.noise * white
         value = value + np.where(false < self.outliers, sign * shift, 0.0)
         if self.counts:

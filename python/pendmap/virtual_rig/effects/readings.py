@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import functools
-import itertools
 import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from scipy.signal import lfilter
 
 from pendmap.virtual_rig.effects.base import Effect, Floats, Reading, effect, shape, size
 
@@ -34,11 +34,6 @@ def read(path: Path, time: Floats, effects: list[Effect]) -> Floats:
     result = np.empty_like(seen.angle)
     result[order] = seen.angle
     return result[: time.size]
-
-
-def first_order_filter(values: Floats, factor: float) -> Floats:
-    """Return ``y[k] = factor y[k - 1] + values[k]``, a first-order filter, shape (N,)."""
-    return np.array(list(itertools.accumulate(values.tolist(), lambda y, x: factor * y + x)))
 
 
 @_reading("reading th + d", signed=True, order=4, d=size(0.0004, 0.0015, "rad"))
@@ -113,7 +108,7 @@ def sensor_lag(seen: Reading, tau: float) -> Floats:
     end = settled(every, np.full(step_count, step))
     # Difference from the steady-state response at the start of each interval.
     jumps = np.concatenate([[0.0], end[:-1] - begin[1:]])
-    departure = first_order_filter(jumps, fade)
+    departure = lfilter([1.0], [1.0, -fade], jumps)
     k = np.clip(np.searchsorted(grid, time, side="right") - 1, 0, step_count - 1)
     t = time - grid[k]
     return np.asarray(settled(k, t) + departure[k] * np.exp(-t / tau))
