@@ -1,4 +1,4 @@
-//! The bifurcation set of a plane: curves of folds, doublings and symmetry breakings.
+//! The bifurcation set of a plane: curves of folds, doublings, symmetry breakings and changes of slips and sticks.
 //!
 //! Branches are followed along sections of the plane: first along its edges, where every curve ends that does not end within,
 //! then in both directions in turn, each in the largest gap that the golden section leaves. On a section all orbits are
@@ -157,8 +157,9 @@ impl Curves {
                 continue;
             }
             let cycles = family.cycles(branch.of);
-            for event in branch.run.events.iter().filter(|event| event.smooth) {
-                if !matches!(event.kind, Kind::Fold | Kind::PeriodDoubling | Kind::SymmetryBreaking)
+            for event in &branch.run.events {
+                // What a jump of a multiplier does is said by the curve of the jump.
+                if event.smooth == event.kind.is_of_friction() || event.kind == Kind::NeimarkSacker
                 {
                     continue;
                 }

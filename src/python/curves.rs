@@ -4,6 +4,7 @@ use numpy::PyArray2;
 use pendmap::continuation::course::{Course, Law};
 use pendmap::continuation::critical::Critical;
 use pendmap::continuation::cycle::Closure;
+use pendmap::continuation::event::Kind;
 use pendmap::continuation::plane::Plane;
 use pendmap::error::Error;
 use pendmap::maps::curves::{Request, Section, curves as search};
@@ -37,6 +38,8 @@ pub struct BifurcationSet {
     velocity: Array<f64>,
     multipliers: Py<PyArray2<f64>>,
     supercritical: Array<i32>,
+    /// What a jump of a multiplier does there: nothing, a fold, a period doubling, a symmetry breaking.
+    jump: Array<i32>,
     /// Of each point of codimension 2: what it is, and its place.
     degenerate_kind: Vec<&'static str>,
     degenerate_place: Array<i32>,
@@ -44,7 +47,7 @@ pub struct BifurcationSet {
     sections: Vec<(usize, f64, usize, usize)>,
 }
 
-/// Curves of folds, period doublings and symmetry breakings of orbits up to the period `longest` in the plane of two axes;
+/// Curves of folds, period doublings, symmetry breakings and changes of slips and sticks of orbits up to the period `longest` in the plane of two axes;
 /// `only` some periods and net turns.
 #[pyfunction]
 #[pyo3(signature = (model, axes, longest, only, threads, progress=None))]
@@ -78,7 +81,7 @@ impl BifurcationSet {
         let sign = |known: Option<bool>| known.map_or(-1, i32::from);
         let (mut curve, mut at, mut multipliers, mut supercritical) =
             (vec![], vec![], vec![], vec![]);
-        let (mut theta, mut velocity) = (vec![], vec![]);
+        let (mut theta, mut velocity, mut jump) = (vec![], vec![], vec![]);
         let (mut degenerate_kind, mut degenerate_place) = (vec![], vec![]);
         // Number of the first point of codimension 2 of each curve.
         let mut first = Vec::new();
@@ -96,8 +99,17 @@ impl BifurcationSet {
                 curve.push(number as i32);
                 at.push(Critical::at(&point.orbit.place).to_vec());
                 let pair = critical.cycles.multipliers(&point.orbit).0;
-                multipliers.push(pair.iter().flat_map(|m| [m.re, m.im]).collect::<Vec<f64>>());
+                // What is held is a set.
+                let size = if one.kind == Kind::RestBoundary { f64::NAN } else { 1.0 };
+                let parts = pair.iter().flat_map(|m| [m.re * size, m.im * size]);
+                multipliers.push(parts.collect::<Vec<f64>>());
                 supercritical.push(sign(critical.is_supercritical(point)));
+                jump.push(match critical.jumped(point) {
+                    None => 0,
+                    Some(Kind::Fold) => 1,
+                    Some(Kind::PeriodDoubling) => 2,
+                    Some(_) => 3,
+                });
             }
         }
         let meets = |of: Option<(usize, usize)>| of.map_or(-1, |(c, k)| (first[c] + k) as i32);
@@ -114,6 +126,7 @@ impl BifurcationSet {
             velocity: array(py, velocity),
             multipliers: PyArray2::from_vec2(py, &multipliers)?.unbind(),
             supercritical: array(py, supercritical),
+            jump: array(py, jump),
             degenerate_kind,
             degenerate_place: array(py, degenerate_place),
             sections: sections.iter().map(|s| (s.held.0, s.held.1, s.orbits, s.new)).collect(),

@@ -134,8 +134,9 @@ def continuation(  # noqa: PLR0913 (physics first, numerical choices by name)
 
     With two parameters: curves of folds, period doublings and symmetry breakings in their plane, of
     all orbits up to some period and of both rests, from sections in both directions until several
-    in a row have no event off the curves. Points of codimension 2 are located: cusps, and where a
-    doubling or a symmetry breaking changes between super- and subcritical.
+    in a row have no event off the curves; under dry friction also of the changes of slips and
+    sticks. Points of codimension 2 are located: cusps, where a doubling or a symmetry breaking
+    changes between super- and subcritical, and where a curve reaches a change of slips and sticks.
 
     Parameters
     ----------
@@ -183,7 +184,8 @@ def continuation(  # noqa: PLR0913 (physics first, numerical choices by name)
         Of two parameters, curves over ``curve``: ``curve_kind``, ``curve_n``, ``curve_w``,
         ``curve_symmetric``, ``curve_begin``, ``curve_end``; their points over ``place``:
         ``place_curve``, ``place_theta``, ``place_velocity``, ``place_multipliers``,
-        ``place_supercritical``, and ``place_p`` and others of the parameters; points of
+        ``place_supercritical``, ``place_jump`` (what a jump of a multiplier does as slips and
+        sticks change), and ``place_p`` and others of the parameters; points of
         codimension 2 over ``degenerate``: ``degenerate_kind``, ``degenerate_n`` and so on.
 
     Raises

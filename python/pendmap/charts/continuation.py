@@ -35,12 +35,11 @@ _MARKERS: Final = {
     "cusp": "s",
     "generalised_doubling": "o",
     "degenerate_symmetry_breaking": "^",
+    "fold_at_event": "s",
+    "period_doubling_at_event": "o",
+    "symmetry_breaking_at_event": "^",
 }
-_DASHES: Final[dict[str, Dash]] = {
-    "fold": "-",
-    "period_doubling": DASHED,
-    "symmetry_breaking": DOTTED,
-}
+_DASHES: Final[dict[str, Dash]] = {kind: dash or "-" for kind, (_, dash) in palette.CURVES.items()}
 _FINER: Final = 8  # Points of a line for each that was computed
 _EMPTY: Final[dict[str, Any]] = {"fill": "#ffffff", "edge": INK, "edge_width": 1.0}
 
@@ -158,12 +157,14 @@ def bifurcation_set(
 ) -> list[Mark]:
     """Return the curves in the plane of two parameters and the points of codimension 2.
 
-    Dashes say what happens; lines are thin where the orbits born there are subcritical. Colours are
+    Dashes say what happens; lines are thin where the orbits born there are subcritical, thick where
+    a multiplier jumps over 1 or -1 as slips and sticks change. Colours are
     those of the orbits' types, or are given for what happens. ``to`` maps points, shape (m, 2).
     """
     if "curve_kind" not in dataset:
         return []
-    owner, sides = (dataset[f"place_{name}"].values for name in ("curve", "supercritical"))
+    names = ("curve", "supercritical", "jump")
+    owner, sides, jumps = (dataset[f"place_{name}"].values for name in names)
     places, degenerate = (
         to(np.stack([dataset[f"{which}_{name}"].values for name in over], axis=-1))
         for which in ("place", "degenerate")
@@ -181,9 +182,10 @@ def bifurcation_set(
         of: dict[str, Any] = {"colour": (colours or {}).get(kind, colour), "dash": _DASHES[kind]}
         points, first = _smooth(places[mine])
         # Where new orbits change their side the coefficient has no sign.
-        thin = (sides[mine] == 0)[first + changes[mine][first]]
+        thin, thick = (one[mine][first + changes[mine][first]] for one in (sides == 0, jumps > 0))
         path = f"{name}/{kind}/{number}".replace(" ", "_").replace(":", "_")
-        for width, shown, at in ((1.5, ~thin, path), (0.6, thin, f"{path}/subcritical")):
+        looks = (1.5, ~(thin | thick), path), (0.6, thin, f"{path}/subcritical")
+        for width, shown, at in (*looks, (2.8, thick, f"{path}/jump")):
             # A piece belongs to both looks at the point where it changes.
             near = shown | np.roll(shown, 1) & (np.arange(shown.size) > 0)
             x, y = np.where(near[:, None], points, np.nan).T
@@ -197,6 +199,8 @@ def bifurcation_set(
         marks.append(Line(NONE, NONE, colour=shade, dash=_DASHES[kind], name=text))
     if (sides == 0).any():
         marks.append(Line(NONE, NONE, colour=INK, width=0.6, name="thin: subcritical"))
+    if jumps.any():
+        marks.append(Line(NONE, NONE, colour=INK, width=2.8, name="thick: a multiplier jumps"))
     special = dataset["degenerate_kind"].values
     at_kind = ((one, degenerate[special == one]) for one in dict.fromkeys(special.tolist()))
     return [*marks, *lines, *(_events(kind, *at.T) for kind, at in at_kind)]
