@@ -238,11 +238,12 @@ def is_alone(event: dict[str, Any], places: list[tuple[int, float]]) -> bool:
 
 
 def along(
-    values: Floats, varied: int, ends: tuple[float, float], **sought: int
+    values: Floats, varied: int, ends: tuple[float, float], sought: tuple[int, int, int]
 ) -> tuple[xr.Dataset, list[dict[str, Any]]]:
-    """Return branches along a parameter, and their events that are alone."""
+    """Return branches of orbits (n, w, longest) along a parameter, and events that are alone."""
     model = pendmap.Pendulum(**dict(zip(RANGES, values.tolist(), strict=True)))
-    result = pendmap.continuation(model, {list(RANGES)[varied]: ends}, **sought)
+    n, w, longest = sought
+    result = pendmap.continuation(model, {list(RANGES)[varied]: ends}, n, w, longest=longest)
     events = records(result, **{key: f"event_{key}" for key in EVENT})
     places = [(one["branch"], one["value"]) for one in events]
     for end in ("branch_first", "branch_last"):
@@ -256,7 +257,7 @@ def on_branches(draw: np.random.Generator, k: int) -> Iterator[tuple[str, bool, 
     values[3] *= k % 2
     varied, (n, w) = int(draw.integers(0, 5)), TYPES[k % len(TYPES)]
     ends = list(RANGES.values())[varied]
-    result, alone = along(values, varied, ends, n=n, w=w, longest=2 * n)
+    result, alone = along(values, varied, ends, (n, w, 2 * n))
     draw.shuffle(alone)
     for event in alone[:3]:
         ok = bracketed(result, event, values, varied)
@@ -295,7 +296,7 @@ def on_curves(draw: np.random.Generator, k: int) -> Iterator[tuple[str, bool, st
             yield kinds[place], excess[0] * excess[1] < 0, text
             continue
         ends = (here - AROUND, here + AROUND)
-        result, alone = along(values, varied, ends, n=n, w=w, longest=n)
+        result, alone = along(values, varied, ends, (n, w, n))
         near = [one for one in alone if abs(one["value"] - here) < ON]
         same = [one for one in near if one["kind"] == kinds[place]]
         ok = bool(same) and bracketed(result, same[0], values, varied)

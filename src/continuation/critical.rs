@@ -279,7 +279,7 @@ impl Critical<'_> {
             let rounding = ROUNDING * (1.0 + system.norm) * size;
             let gap = system.gap.amax();
             if gap <= rounding || (before < SETTLED * size && gap < rounding.sqrt()) {
-                return self.complete(place, guess, &system, row, vectors, bend);
+                return self.complete(&place, guess, &system, row, vectors, bend);
             }
             let count = system.gap.len();
             let mut right = system.gap.clone().insert_row(count, 0.0);
@@ -289,7 +289,7 @@ impl Critical<'_> {
             let grows = length > CONTRACTION[far] * before && length > SETTLED * size;
             if grows && gap < STALLED * (1.0 + system.norm) * size {
                 // No more than rounding is left.
-                return self.complete(place, guess, &system, row, vectors, bend);
+                return self.complete(&place, guess, &system, row, vectors, bend);
             }
             if !length.is_finite() || grows {
                 return None;
@@ -312,7 +312,7 @@ impl Critical<'_> {
 
     fn complete(
         &self,
-        place: DVector<f64>,
+        place: &DVector<f64>,
         guess: &DVector<f64>,
         system: &System,
         row: &DVector<f64>,
@@ -325,7 +325,7 @@ impl Critical<'_> {
         last[count] = 1.0;
         let tangent = factors.solve(&last)?.normalize();
         let orientation = factors.determinant() > 0.0;
-        let moved = (&place - guess).norm();
+        let moved = (place - guess).norm();
         let seen = |system: &System| {
             self.cycles.finished(place.clone(), system, tangent.clone(), orientation, moved)
         };
@@ -335,9 +335,8 @@ impl Critical<'_> {
         }
         let slope = system.matrix.row(count - 1).transpose();
         let across = &slope * (ACROSS / slope.norm_squared());
-        let side = |by: f64| {
-            Some(seen(&self.system(&(&place + &across * by), None, self.steps(&place))?.0))
-        };
+        let side =
+            |by: f64| Some(seen(&self.system(&(place + &across * by), None, self.steps(place))?.0));
         let (orbit, near, far) = (side(1.0)?, side(-1.0)?, side(-4.0)?);
         // Where a stick appears derivatives change with the root of the distance, otherwise with the distance.
         let other = std::array::from_fn(|k| 2.0 * near.tests[k] - far.tests[k]);

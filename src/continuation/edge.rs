@@ -26,6 +26,7 @@ const LATER: f64 = 1e-5;
 pub type Edge = (f64, [f64; 4]);
 
 /// The number of the last step, which ends at a velocity 0 if it `stops`; none where there is none.
+#[must_use]
 pub fn passed<const N: usize>(
     kind: Kind,
     ode: &OdeProblem<Tangent<f64, N>>,

@@ -123,7 +123,7 @@ impl<'a, const N: usize> Period<'a, N> {
         while let Some(piece) = driver.advance() {
             let phase = match piece {
                 Piece::Step => {
-                    let stops = driver.events.last().is_some_and(|stop| stop.tau == driver.tau);
+                    let stops = driver.events.last().is_some_and(|stop| stop.tau >= driver.tau);
                     let watched = self.watched;
                     edges.extend(watched.and_then(|kind| edge::passed(kind, ode, &driver, stops)));
                     Phase::moving(driver.dense.signs[0])

@@ -94,10 +94,10 @@ impl Cycles<'_> {
             let linear = far.moved < LINEAR * distance;
             let orientation = far.orientation;
             let old = Orbit { tangent: row, orientation, ..old.clone() };
-            linear.then(|| Shed { of, orbits: [old, far], side })
+            linear.then_some(Shed { of, orbits: [old, far], side })
         };
-        let all = DISTANCES.iter().flat_map(|distance| [(1.0, *distance), (-1.0, *distance)]);
-        all.filter_map(begun).next()
+        let mut all = DISTANCES.iter().flat_map(|distance| [(1.0, *distance), (-1.0, *distance)]);
+        all.find_map(begun)
     }
 
     /// The points of an orbit as one of another type that has it as a special case.
