@@ -1,5 +1,8 @@
 """Events of ``pendmap continue`` under dry friction, bracketed by runs of scipy.
 
+With ``--planes``, points of its curves of these events over two parameters, drawn at random. At
+such a point the branch is followed along the first parameter alone, and its event must be there.
+
 Pendulums and parameters that vary are drawn at random. Beside every event, at the parameter plus
 and minus 1e-6, the orbit of the branch is sought by Newton's method on a map of scipy (DOP853).
 Events that are alone within twice that distance on their branch are taken. One is bracketed if
@@ -26,6 +29,8 @@ from benchmarks.peers.report import machine, note, say, table
 from pendmap.analysis.result import records
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     import xarray as xr
 
 Floats = NDArray[np.float64]
@@ -37,6 +42,10 @@ RANGES = {
     "theta_r": (0.02, 0.4),
 }
 TYPES = ((2, 0), (1, 0), (1, 1), (2, 1), (4, 0))
+PLANES = (("p", "omega"), ("p", "theta_r"), ("p", "torque"), ("omega", "gamma"))
+PART = 0.25  # Of the range of a parameter that a plane has
+AROUND = 1e-4
+ON = 1e-9
 BESIDE = 1e-6
 EVENT = ("kind", "value", "theta", "velocity", "n", "w", "branch", "orbit")
 CRITICAL = {"period_doubling": -1, "symmetry_breaking": 1}
@@ -228,37 +237,91 @@ def is_alone(event: dict[str, Any], places: list[tuple[int, float]]) -> bool:
     return all(away == 0 or away > 2 * BESIDE for away in mine)
 
 
+def along(
+    values: Floats, varied: int, ends: tuple[float, float], sought: tuple[int, int, int]
+) -> tuple[xr.Dataset, list[dict[str, Any]]]:
+    """Return branches of orbits (n, w, longest) along a parameter, and events that are alone."""
+    model = pendmap.Pendulum(**dict(zip(RANGES, values.tolist(), strict=True)))
+    n, w, longest = sought
+    result = pendmap.continuation(model, {list(RANGES)[varied]: ends}, n, w, longest=longest)
+    events = records(result, **{key: f"event_{key}" for key in EVENT})
+    places = [(one["branch"], one["value"]) for one in events]
+    for end in ("branch_first", "branch_last"):
+        places += list(enumerate(result[end].values.tolist()))
+    return result, [one for one in events if is_alone(one, places)]
+
+
+def on_branches(draw: np.random.Generator, k: int) -> Iterator[tuple[str, bool, str]]:
+    """Yield events on the branches of a pendulum: what happens, whether bracketed, where."""
+    values = np.array([draw.uniform(*ends) for ends in RANGES.values()])
+    values[3] *= k % 2
+    varied, (n, w) = int(draw.integers(0, 5)), TYPES[k % len(TYPES)]
+    ends = list(RANGES.values())[varied]
+    result, alone = along(values, varied, ends, (n, w, 2 * n))
+    draw.shuffle(alone)
+    for event in alone[:3]:
+        ok = bracketed(result, event, values, varied)
+        yield event["kind"], ok, f"{values.tolist()} {varied} {event}"
+
+
+def on_curves(draw: np.random.Generator, k: int) -> Iterator[tuple[str, bool, str]]:
+    """Yield points of curves in a plane: what happens, whether bracketed, where."""
+    values = np.array([draw.uniform(*ends) for ends in RANGES.values()])
+    over, names = PLANES[k % len(PLANES)], list(RANGES)
+    ranges = {}
+    for name in over:
+        (low, high), part = RANGES[name], draw.uniform(0, 1 - PART)
+        ranges[name] = low + part * (high - low), low + (part + PART) * (high - low)
+    values[3] *= k // len(PLANES) % 2
+    model = pendmap.Pendulum(**dict(zip(names, values.tolist(), strict=True)))
+    plane = pendmap.continuation(model, ranges, up_to=2)
+    kinds = plane["curve_kind"].values[plane["place_curve"].values]
+    fit = [np.isin(kinds, ("stick_onset", "grazing", "rest_boundary"))]
+    for name, (low, high) in ranges.items():
+        at = plane[f"place_{name}"].values
+        fit.append((low + AROUND < at) & (at < high - AROUND))
+    places = np.flatnonzero(np.all(fit, axis=0))
+    for place in draw.permutation(places)[:3]:
+        for name in over:
+            values[names.index(name)] = plane[f"place_{name}"].values[place]
+        curve, varied = int(plane["place_curve"].values[place]), names.index(over[0])
+        n, w = (int(plane[f"curve_{key}"].values[curve]) for key in ("n", "w"))
+        here, text = values[varied], f"{values.tolist()} {varied} {n}:{w}"
+        if kinds[place] == "rest_boundary":
+            theta = float(plane["place_theta"].values[place])
+            excess = []
+            for by in (-BESIDE, BESIDE):
+                values[varied] = here + by
+                excess.append(Motion(values).excess(theta))
+            yield kinds[place], excess[0] * excess[1] < 0, text
+            continue
+        ends = (here - AROUND, here + AROUND)
+        result, alone = along(values, varied, ends, (n, w, n))
+        near = [one for one in alone if abs(one["value"] - here) < ON]
+        same = [one for one in near if one["kind"] == kinds[place]]
+        ok = bool(same) and bracketed(result, same[0], values, varied)
+        yield kinds[place], ok, f"{text} {near}"
+
+
 def main() -> None:
     """Print how many events are bracketed."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=50, help="events")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--planes", action="store_true", help="points of curves over two")
     asked = parser.parse_args()
     say(machine(["pendmap", "scipy"]))
-    draw, names = np.random.default_rng(asked.seed), list(RANGES)
+    draw = np.random.default_rng(asked.seed)
     right: Counter[str] = Counter()
     every: Counter[str] = Counter()
-    k = 0
-    while every.total() < asked.count:
-        values = np.array([draw.uniform(*ends) for ends in RANGES.values()])
-        values[3] *= k % 2
-        varied, (n, w) = int(draw.integers(0, 5)), TYPES[k % len(TYPES)]
-        k += 1
-        model = pendmap.Pendulum(**dict(zip(names, values.tolist(), strict=True)))
-        ranges = {names[varied]: RANGES[names[varied]]}
-        result = pendmap.continuation(model, ranges, n=n, w=w, longest=2 * n)
-        events = records(result, **{key: f"event_{key}" for key in EVENT})
-        places = [(one["branch"], one["value"]) for one in events]
-        for end in ("branch_first", "branch_last"):
-            places += list(enumerate(result[end].values.tolist()))
-        alone = [one for one in events if is_alone(one, places)]
-        draw.shuffle(alone)
-        for event in alone[:3]:
-            ok = bracketed(result, event, values, varied)
-            every[event["kind"]] += 1
-            right[event["kind"]] += ok
+    for k in itertools.count():
+        if every.total() >= asked.count:
+            break
+        for kind, ok, where in (on_curves if asked.planes else on_branches)(draw, k):
+            every[kind] += 1
+            right[kind] += ok
             if not ok:
-                say(f"not bracketed: {names}={values.tolist()} {names[varied]} {event}")
+                say(f"not bracketed: {list(RANGES)} {where}")
         note(f"{every.total()} of {asked.count}")
     say(table(["event", "number", "bracketed"], [[x, str(every[x]), str(right[x])] for x in every]))
 

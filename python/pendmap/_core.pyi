@@ -167,6 +167,7 @@ class BifurcationSet:
     velocity: _Floats
     multipliers: _Floats
     supercritical: _Places
+    jump: _Places
     degenerate_kind: list[str]
     degenerate_place: _Places
     sections: list[tuple[int, float, int, int]]

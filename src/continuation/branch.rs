@@ -165,7 +165,7 @@ impl Cycles<'_> {
                             if !bounds.holds(self.at(&after.place)) {
                                 return Ok((run, End::Range));
                             }
-                            transition::crossed(&mut run, &before, after);
+                            transition::crossed(self, &mut run, &before, after);
                             length = FIRST;
                             continue;
                         }
@@ -203,7 +203,7 @@ impl Cycles<'_> {
             }
             None => {
                 if let Some(after) = self.turned_back(here) {
-                    transition::crossed(run, here, after);
+                    transition::crossed(self, run, here, after);
                     return None;
                 }
                 return Some(self.faded(here, run).unwrap_or(End::Lost(here.norm)));

@@ -1,6 +1,7 @@
-//! Orbits with a critical multiplier, in the plane of two coordinates.
+//! Orbits at which something happens, in the plane of two coordinates: zeros of the closing system and of one number more.
 //!
-//! The matrix `W` of [`Cycles::weak`] is singular where `m` is a multiplier. Bordered by two vectors,
+//! Where slips and sticks change that number is one of [`super::edge`], and for the boundary of rest the excess of the load
+//! where it is least. Otherwise a multiplier is critical. The matrix `W` of [`Cycles::weak`] is singular where `m` is a multiplier. Bordered by two vectors,
 //! `W v + b g = 0`, `c v = 1`, it is regular there, and `g = 0` says that `W` is singular (minimally augmented system;
 //! Govaerts 2000, Numerical Methods for Bifurcations of Dynamical Equilibria, chapter 4). With `w` of the transposed
 //! system, `dg = -w dW v`. `dW v` is the derivative of the map's first derivatives along `v`: a difference of exact ones, whose
@@ -11,6 +12,7 @@ use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 use super::cycle::{Closure, Cycles, Orbit, System, bordered};
 use super::event::Kind;
 use super::period::{Image, Period};
+use crate::attractor::rest::balances;
 use crate::integrate::State;
 
 /// Newton's steps at most and the part of the step before that a step may have, from beside the curve and from afar; a
@@ -24,9 +26,12 @@ const STALLED: f64 = 1e-11;
 const ROUNDING: f64 = 256.0 * f64::EPSILON;
 /// Displacement along `v` of the difference for a second derivative, near the cube root of rounding.
 const BESIDE: f64 = 6e-6;
+/// The number of a change of slips and sticks at which orbits beside it are looked at.
+const ACROSS: f64 = 1e-9;
+/// Displacement of the difference for a derivative of the least load.
+const APART: f64 = 1e-6;
 
-/// Orbits of one type at which a multiplier of the map that closes is critical. The two coordinates of the course
-/// run from 0 to 1.
+/// Orbits of one type at which something happens. The two coordinates of the course run from 0 to 1.
 #[derive(Clone, Copy, Debug)]
 pub struct Critical<'a> {
     /// The orbits.
@@ -35,7 +40,7 @@ pub struct Critical<'a> {
     pub kind: Kind,
 }
 
-/// The vectors that border the matrix: left and right.
+/// The vectors that border the matrix: left and right; empty where no multiplier is critical.
 #[derive(Clone, Debug)]
 pub struct Border([DVector<f64>; 2]);
 
@@ -49,7 +54,12 @@ pub struct Point {
     /// At a fold the coefficient of the square along the null vector, which vanishes at a cusp; else that of the cube
     /// ([`Critical::cubic`]), not a number where it is not known. Both have the signs of the null vectors.
     pub coefficient: f64,
+    /// Where slips and sticks change: [`Orbit::tests`] on both sides, that of fewer sticks first.
+    pub beside: [[f64; 2]; 2],
 }
+
+/// One more equation: its value, its derivatives by the place, the null vectors, the coefficient of the square.
+type Condition = (f64, DVector<f64>, Border, f64);
 
 impl Critical<'_> {
     /// The multiplier of the map that closes.
@@ -84,7 +94,10 @@ impl Critical<'_> {
     /// The points of a place.
     #[must_use]
     pub fn points(&self, place: &DVector<f64>) -> Vec<State> {
-        if self.moving() == 0 {
+        if self.kind == Kind::RestBoundary {
+            let sides = balances(&self.cycles.course.pendulum(&Self::at(place)));
+            vec![[sides[usize::from(self.cycles.of.centre.cos() < 0.0)], 0.0]]
+        } else if self.moving() == 0 {
             vec![[self.cycles.of.centre, 0.0]]
         } else {
             self.cycles.points(place)
@@ -141,10 +154,68 @@ impl Critical<'_> {
         steps: usize,
     ) -> Option<(System, Border, f64)> {
         let at = Self::at(place);
-        let map = Period::<4>::new(self.cycles.course, &at).by(steps);
+        let map = Period::<4>::new(self.cycles.course, &at).by(steps).watching(self.kind);
         let points = self.points(place);
-        let (count, moving, root) = (points.len(), self.moving(), self.cycles.root());
+        let (count, moving) = (points.len(), self.moving());
         let images = self.images(&map, std::slice::from_ref(&points)).pop()?;
+        let (g, row, border, bend) = match self.kind {
+            Kind::RestBoundary => self.held(place),
+            Kind::StickOnset | Kind::Grazing => self.touching(&images)?,
+            _ => self.singular(&map, &points, &images, border)?,
+        };
+        let mut gap = DVector::zeros(moving + 1);
+        let mut matrix = DMatrix::zeros(moving + 1, moving + 2);
+        gap[moving] = g;
+        matrix.row_mut(moving).copy_from(&row.transpose());
+        let factors = self.factors();
+        for (i, image) in images.iter().enumerate().take(if moving == 0 { 0 } else { count }) {
+            self.cycles.close((i, image), &points, &mut gap, &mut matrix);
+            for row in 0..2 {
+                for k in 0..2 {
+                    matrix[(2 * i + row, moving + k)] = factors[i] * image.by_course[k][row];
+                }
+            }
+        }
+        let norm = images.iter().map(|image| image.by_state.norm()).fold(0.0, f64::max);
+        let finite = gap.iter().chain(matrix.iter()).all(|x| x.is_finite());
+        finite.then_some((System { gap, matrix, images, norm }, border, bend))
+    }
+
+    /// That friction holds rest for ever at one angle alone.
+    fn held(&self, place: &DVector<f64>) -> Condition {
+        let excess = |axis: usize, by: f64| {
+            let mut beside = place.clone();
+            beside[axis] += by;
+            let [[theta, _]] = self.points(&beside)[..] else { return f64::NAN };
+            self.cycles.course.pendulum(&Self::at(&beside)).equation().excess(theta)
+        };
+        let slope = |axis, _| (excess(axis, APART) - excess(axis, -APART)) / (2.0 * APART);
+        (excess(0, 0.0), DVector::from_fn(2, slope), Border::none(), f64::NAN)
+    }
+
+    /// That the number along the motion which is nearest to 0 vanishes.
+    fn touching(&self, images: &[Image]) -> Option<Condition> {
+        let numbers = images.iter().enumerate();
+        let all = numbers.flat_map(|(i, image)| image.edges.iter().map(move |edge| (i, edge)));
+        let (i, (value, slope)) = all.min_by(|a, b| a.1.0.abs().total_cmp(&b.1.0.abs()))?;
+        let (moving, root) = (self.moving(), self.cycles.root());
+        let mut row = DVector::zeros(moving + 2);
+        for k in 0..2 {
+            row[2 * i + k] = root * slope[k];
+            row[moving + k] = slope[2 + k];
+        }
+        Some((*value, row, Border::none(), f64::NAN))
+    }
+
+    /// That the multiplier is critical.
+    fn singular(
+        &self,
+        map: &Period<'_, 4>,
+        points: &[State],
+        images: &[Image],
+        border: Option<&Border>,
+    ) -> Option<Condition> {
+        let (moving, root) = (self.moving(), self.cycles.root());
         let parts: Vec<Matrix2<f64>> = images.iter().map(|image| image.by_state).collect();
         let own;
         let border = if let Some(border) = border {
@@ -156,43 +227,36 @@ impl Critical<'_> {
         let (weak, Border([b, c])) = (self.cycles.weak(&parts, self.multiplier()), border);
         let (right, g) = null_vector(&weak, b, c)?;
         let (left, _) = null_vector(&weak.transpose(), c, b)?;
-        let sides = [BESIDE, -BESIDE].map(|by| Self::beside(&points, &right, by / right.norm()));
-        let sides = self.images(&map, &sides);
+        let sides = [BESIDE, -BESIDE].map(|by| Self::beside(points, &right, by / right.norm()));
+        let sides = self.images(map, &sides);
         let per_unit = right.norm() / (2.0 * BESIDE);
 
         let factors = self.factors();
-        let mut gap = DVector::zeros(moving + 1);
-        let mut matrix = DMatrix::zeros(moving + 1, moving + 2);
+        let mut by_place = DVector::zeros(moving + 2);
         let mut square = 0.0;
-        gap[moving] = g;
-        for i in 0..count {
-            let (image, factor) = (&images[i], factors[i]);
-            let w = Vector2::new(left[2 * i], left[2 * i + 1]) * factor;
+        for (i, factor) in factors.iter().enumerate() {
+            let w = Vector2::new(left[2 * i], left[2 * i + 1]) * *factor;
             let turned = (sides[0][i].by_state - sides[1][i].by_state) * per_unit;
             let along = Vector2::new(right[2 * i], right[2 * i + 1]);
             square += w.dot(&(turned * along));
             for k in 0..2 {
                 let moved = (sides[0][i].by_course[k] - sides[1][i].by_course[k]) * per_unit;
-                matrix[(moving, moving + k)] -= w.dot(&moved);
-            }
-            if moving == 0 {
-                continue;
-            }
-            self.cycles.close((i, image), &points, &mut gap, &mut matrix);
-            for row in 0..2 {
-                for k in 0..2 {
-                    matrix[(2 * i + row, moving + k)] = factor * image.by_course[k][row];
+                by_place[moving + k] -= w.dot(&moved);
+                if moving > 0 {
+                    by_place[2 * i + k] = -root * w.dot(&turned.column(k));
                 }
-                matrix[(moving, 2 * i + row)] = -root * w.dot(&turned.column(row));
             }
         }
-        let norm = parts.iter().map(Matrix2::norm).fold(0.0, f64::max);
-        let finite = gap.iter().chain(matrix.iter()).all(|x| x.is_finite());
         // Without the lengths of the vectors.
         let sizes = [left.norm(), right.norm()];
         let bend = square / (sizes[0] * sizes[1] * sizes[1]);
         let border = Border([left / sizes[0], right / sizes[1]]);
-        finite.then_some((System { gap, matrix, images, norm }, border, bend))
+        Some((g, by_place, border, bend))
+    }
+
+    /// Equal steps of a period there.
+    fn steps(&self, place: &DVector<f64>) -> usize {
+        Period::<4>::count(self.cycles.course, &Self::at(place))
     }
 
     /// The point of the curve near `guess` in the plane through it across `row`, by Newton's method; its tangent has the sense
@@ -204,7 +268,7 @@ impl Critical<'_> {
         row: &DVector<f64>,
         border: Option<&Border>,
     ) -> Option<Point> {
-        let steps = Period::<4>::count(self.cycles.course, &Self::at(guess));
+        let steps = self.steps(guess);
         let mut place = guess.clone();
         let mut before = f64::INFINITY;
         let mut kept = border.cloned();
@@ -215,7 +279,7 @@ impl Critical<'_> {
             let rounding = ROUNDING * (1.0 + system.norm) * size;
             let gap = system.gap.amax();
             if gap <= rounding || (before < SETTLED * size && gap < rounding.sqrt()) {
-                return self.complete(place, guess, &system, row, vectors, bend);
+                return self.complete(&place, guess, &system, row, vectors, bend);
             }
             let count = system.gap.len();
             let mut right = system.gap.clone().insert_row(count, 0.0);
@@ -225,7 +289,7 @@ impl Critical<'_> {
             let grows = length > CONTRACTION[far] * before && length > SETTLED * size;
             if grows && gap < STALLED * (1.0 + system.norm) * size {
                 // No more than rounding is left.
-                return self.complete(place, guess, &system, row, vectors, bend);
+                return self.complete(&place, guess, &system, row, vectors, bend);
             }
             if !length.is_finite() || grows {
                 return None;
@@ -239,17 +303,16 @@ impl Critical<'_> {
 
     /// The point at a place where the curve is not alone, with the null vector for a tangent.
     pub(super) fn degenerate(&self, place: &DVector<f64>) -> Option<Point> {
-        let steps = Period::<4>::count(self.cycles.course, &Self::at(place));
-        let (system, border, coefficient) = self.system(place, None, steps)?;
+        let (system, border, coefficient) = self.system(place, None, self.steps(place))?;
         let [_, right] = border.vectors();
         let tangent = right.clone().resize_vertically(place.len(), 0.0);
         let orbit = self.cycles.finished(place.clone(), &system, tangent, true, 0.0);
-        Some(Point { orbit, border, coefficient })
+        Some(Point { orbit, border, coefficient, beside: [[f64::NAN; 2]; 2] })
     }
 
     fn complete(
         &self,
-        place: DVector<f64>,
+        place: &DVector<f64>,
         guess: &DVector<f64>,
         system: &System,
         row: &DVector<f64>,
@@ -262,13 +325,32 @@ impl Critical<'_> {
         last[count] = 1.0;
         let tangent = factors.solve(&last)?.normalize();
         let orientation = factors.determinant() > 0.0;
-        let moved = (&place - guess).norm();
-        let orbit = self.cycles.finished(place, system, tangent, orientation, moved);
-        Some(Point { orbit, border, coefficient: bend })
+        let moved = (place - guess).norm();
+        let seen = |system: &System| {
+            self.cycles.finished(place.clone(), system, tangent.clone(), orientation, moved)
+        };
+        if !matches!(self.kind, Kind::StickOnset | Kind::Grazing) {
+            let beside = [[f64::NAN; 2]; 2];
+            return Some(Point { orbit: seen(system), border, coefficient: bend, beside });
+        }
+        let slope = system.matrix.row(count - 1).transpose();
+        let across = &slope * (ACROSS / slope.norm_squared());
+        let side =
+            |by: f64| Some(seen(&self.system(&(place + &across * by), None, self.steps(place))?.0));
+        let (orbit, near, far) = (side(1.0)?, side(-1.0)?, side(-4.0)?);
+        // Where a stick appears derivatives change with the root of the distance, otherwise with the distance.
+        let other = std::array::from_fn(|k| 2.0 * near.tests[k] - far.tests[k]);
+        let beside = [orbit.tests, other];
+        Some(Point { orbit, border, coefficient: bend, beside })
     }
 }
 
 impl Border {
+    /// None.
+    fn none() -> Self {
+        Self([DVector::zeros(0), DVector::zeros(0)])
+    }
+
     /// The left and the right vector.
     #[must_use]
     pub fn vectors(&self) -> [&DVector<f64>; 2] {

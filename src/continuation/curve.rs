@@ -1,9 +1,11 @@
-//! A curve of orbits with a critical multiplier, followed by pseudo-arclength in the plane of two coordinates.
+//! A curve of orbits at which something happens, followed by pseudo-arclength in the plane of two coordinates.
 //!
 //! As [`super::branch`] follows orbits along one coordinate. Points of codimension
 //! 2 are zeros of the coefficient of the normal form: of the square at a cusp, where the curve itself is smooth and passes
 //! through; of the cube where a doubling or a symmetry breaking changes between super- and subcritical, and a curve
-//! of folds of the new orbits begins (Kuznetsov 2004, Elements of Applied Bifurcation Theory, sections 9.2 and 9.3).
+//! of folds of the new orbits begins (Kuznetsov 2004, Elements of Applied Bifurcation Theory, sections 9.2 and 9.3). Where slips and
+//! sticks change they are zeros of the tests on either side: a curve of folds or doublings reaches the curve there, and the
+//! multiplier begins or ceases to jump over the critical value.
 
 use std::sync::atomic::AtomicBool;
 
@@ -53,6 +55,8 @@ pub enum Degenerate {
     GeneralisedDoubling,
     /// The symmetry breaking does.
     SymmetryBreaking,
+    /// A curve of folds, doublings or symmetry breakings reaches one where slips and sticks change.
+    Reached(Kind),
 }
 
 impl Degenerate {
@@ -63,6 +67,9 @@ impl Degenerate {
             Self::Cusp => "cusp",
             Self::GeneralisedDoubling => "generalised_doubling",
             Self::SymmetryBreaking => "degenerate_symmetry_breaking",
+            Self::Reached(Kind::Fold) => "fold_at_event",
+            Self::Reached(Kind::PeriodDoubling) => "period_doubling_at_event",
+            Self::Reached(_) => "symmetry_breaking_at_event",
         }
     }
 }
@@ -175,7 +182,8 @@ impl Critical<'_> {
             *refused = None;
             return Err(CHANGE[0]);
         };
-        if next.orbit.phases != here.orbit.phases || next.orbit.stuck != here.orbit.stuck {
+        let alike = next.orbit.phases == here.orbit.phases && next.orbit.stuck == here.orbit.stuck;
+        if !alike && self.kind != Kind::RestBoundary {
             *refused = Some(if next.orbit.stuck { End::Sticks } else { End::Phases });
             return Err(CHANGE[0]);
         }
@@ -195,6 +203,9 @@ impl Critical<'_> {
 
     /// Whether rounding hides that a multiplier is critical.
     fn is_vague(&self, point: &Point) -> bool {
+        if self.kind.is_of_friction() {
+            return false;
+        }
         // The product of the distances of both multipliers from it, and about that of the other one.
         let tests = point.orbit.tests;
         let test = tests[usize::from(self.multiplier() < 0.0)];
@@ -212,15 +223,15 @@ impl Critical<'_> {
 
     /// The coefficient of the normal form, precise or to some digits; not a number where it is not known.
     pub(super) fn coefficient(&self, point: &Point, precise: bool) -> f64 {
-        if self.kind == Kind::Fold {
+        if self.kind == Kind::Fold || self.kind.is_of_friction() {
             return point.coefficient;
         }
         self.cubic(point, precise).unwrap_or(f64::NAN)
     }
 
-    /// What a curve of folds ends on between two points: orbits with half the period or more symmetry.
+    /// What a curve ends on between two points where no multiplier says so: orbits with half the period or more symmetry.
     fn meets(&self, here: &Point, next: &Point) -> Option<(End, Met)> {
-        if self.kind != Kind::Fold {
+        if !(self.kind == Kind::Fold || self.kind.is_of_friction()) {
             return None;
         }
         let (of, _, part) = self.cycles.met_type(&here.orbit, &next.orbit)?;
@@ -299,34 +310,54 @@ impl Critical<'_> {
         })
     }
 
-    /// Adds a point, and before it one of codimension 2 if the coefficient passes 0.
+    /// The numbers whose zeros are points of codimension 2: of which side and which test; none for the coefficient.
+    fn numbers(&self) -> Vec<(Degenerate, Option<[usize; 2]>)> {
+        let of_side = |side: usize| {
+            let kinds = [Kind::Fold, self.cycles.at_minus_one()].into_iter().enumerate();
+            kinds.map(move |(test, kind)| (Degenerate::Reached(kind), Some([side, test])))
+        };
+        match self.kind {
+            Kind::Fold => vec![(Degenerate::Cusp, None)],
+            Kind::PeriodDoubling => vec![(Degenerate::GeneralisedDoubling, None)],
+            Kind::SymmetryBreaking => vec![(Degenerate::SymmetryBreaking, None)],
+            // A turn that becomes a stick reverses ever more slowly: multipliers are continuous.
+            Kind::StickOnset => of_side(0).collect(),
+            Kind::Grazing => (0..2).flat_map(of_side).collect(),
+            _ => Vec::new(),
+        }
+    }
+
+    /// Adds a point, and before it those of codimension 2.
     fn add(&self, run: &mut Run, here: &Point, next: Point) {
-        if here.coefficient * next.coefficient < 0.0
-            && let Some(found) = self.zero(here, &next)
-        {
-            let kind = match self.kind {
-                Kind::Fold => Degenerate::Cusp,
-                Kind::PeriodDoubling => Degenerate::GeneralisedDoubling,
-                _ => Degenerate::SymmetryBreaking,
-            };
+        let mut all: Vec<(f64, Degenerate, Point)> = Vec::new();
+        for (kind, of) in self.numbers() {
+            if here.number(of) * next.number(of) < 0.0
+                && let Some(point) = self.zero(here, &next, of)
+            {
+                let along = here.orbit.tangent.dot(&(&point.orbit.place - &here.orbit.place));
+                all.push((along, kind, point));
+            }
+        }
+        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for (_, kind, point) in all {
             run.degenerate.push((kind, run.points.len()));
-            run.points.push(found);
+            run.points.push(point);
         }
         run.points.push(next);
     }
 
-    /// The point between two at which the coefficient vanishes, by false position with the value at an end that is kept
+    /// The point between two at which a number vanishes, by false position with the value at an end that is kept
     /// twice halved (the Illinois variant).
-    fn zero(&self, a: &Point, b: &Point) -> Option<Point> {
-        let mut ends = [(0.0, a.coefficient), (1.0, b.coefficient)];
+    fn zero(&self, a: &Point, b: &Point, of: Option<[usize; 2]>) -> Option<Point> {
+        let mut ends = [(0.0, a.number(of)), (1.0, b.number(of))];
         let (mut best, mut stayed): (Option<Point>, _) = (None, None);
         for _ in 0..REFINEMENTS {
             let [(low, at_low), (high, at_high)] = ends;
             let part = (low * at_high - high * at_low) / (at_high - at_low);
             let guess = interpolated(&a.orbit, &b.orbit, part);
             let mut point = self.near(&guess, &a.orbit.tangent, Some(&a.border))?;
-            let value = self.coefficient(&point, true);
-            point.coefficient = value;
+            point.coefficient = self.coefficient(&point, true);
+            let value = point.number(of);
             let side = usize::from(value.signum() != at_low.signum());
             let known = (part - ends[side].0).abs() < EXACT || high - low < EXACT;
             ends[side] = (part, value);
@@ -334,7 +365,7 @@ impl Critical<'_> {
                 ends[1 - side].1 *= 0.5;
             }
             stayed = Some(side);
-            if best.as_ref().is_none_or(|least| value.abs() <= least.coefficient.abs()) {
+            if best.as_ref().is_none_or(|least| value.abs() <= least.number(of).abs()) {
                 best = Some(point);
             }
             if value == 0.0 || known || value.is_nan() {
@@ -342,7 +373,26 @@ impl Critical<'_> {
             }
         }
         // The signs at the ends are those of some digits alone.
-        let least = ZERO * a.coefficient.abs().max(b.coefficient.abs());
-        best.filter(|point| point.coefficient.abs() < least)
+        let least = ZERO * a.number(of).abs().max(b.number(of).abs());
+        best.filter(|point| point.number(of).abs() < least)
+    }
+
+    /// What a jump of a multiplier does at a point where slips and sticks change: over 1 the branch turns back, over -1 an
+    /// orbit of twice the period or a pair of asymmetric ones is born.
+    #[must_use]
+    pub fn jumped(&self, point: &Point) -> Option<Kind> {
+        let [one, other] = point.beside;
+        if one[0] * other[0] < 0.0 {
+            Some(Kind::Fold)
+        } else {
+            (one[1] * other[1] < 0.0).then(|| self.cycles.at_minus_one())
+        }
+    }
+}
+
+impl Point {
+    /// A test on one side where slips and sticks change, or the coefficient.
+    fn number(&self, of: Option<[usize; 2]>) -> f64 {
+        of.map_or(self.coefficient, |[side, test]| self.beside[side][test])
     }
 }

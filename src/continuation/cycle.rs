@@ -21,6 +21,7 @@ use nalgebra::{DMatrix, DVector, Dyn, LU, Matrix2};
 
 pub use super::closure::{Closure, Type};
 use super::course::Course;
+use super::event::Kind;
 use super::period::{Image, Period};
 use super::phases::{Phase, round};
 use crate::integrate::State;
@@ -374,6 +375,11 @@ impl Cycles<'_> {
         let svd = self.weak(&orbit.parts, m).svd(false, true);
         let least = svd.singular_values.imin();
         Some(svd.v_t?.row(least).transpose())
+    }
+
+    /// What happens where the closing map has the multiplier -1.
+    pub(super) fn at_minus_one(&self) -> Kind {
+        if self.of.closure == Closure::Half { Kind::SymmetryBreaking } else { Kind::PeriodDoubling }
     }
 
     /// Multipliers of the orbit.

@@ -41,6 +41,12 @@ pub enum Kind {
 }
 
 impl Kind {
+    /// Whether slips and sticks change there, where no multiplier need be critical.
+    #[must_use]
+    pub fn is_of_friction(self) -> bool {
+        matches!(self, Self::StickOnset | Self::Grazing | Self::RestBoundary)
+    }
+
     /// Its name.
     #[must_use]
     pub fn word(self) -> &'static str {

@@ -8,9 +8,9 @@
 //! - [`event`]: folds, doublings, symmetry breakings; [`shed`]: the branches that begin there
 //! - `neimark_sacker`: the invariant curves that begin where a complex pair passes the unit circle
 //! - `swing`: amplitudes
-//! - `transition`: where slips and sticks change
+//! - `transition`: where slips and sticks change; [`edge`]: numbers that vanish there
 //! - [`family`]: branches, and what they shed; [`regions`]: where the same orbits are stable
-//! - [`critical`]: orbits with a critical multiplier in the plane of two coordinates; `normal_form`: which side the
+//! - [`critical`]: orbits in the plane of two coordinates at which something happens; `normal_form`: which side the
 //!   new orbits live on; [`curve`]: curves of them; [`plane`]: all curves
 
 pub mod branch;
@@ -19,6 +19,7 @@ pub mod course;
 pub mod critical;
 pub mod curve;
 pub mod cycle;
+pub mod edge;
 pub mod event;
 pub mod family;
 mod meeting;

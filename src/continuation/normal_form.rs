@@ -36,9 +36,12 @@ impl Critical<'_> {
     /// without damping.
     #[must_use]
     pub fn is_supercritical(&self, point: &Point) -> Option<bool> {
-        let (c, scalar) = (point.coefficient, point.border.scalar());
-        let known = self.kind != Kind::Fold && c.is_finite() && scalar.abs() > NONE;
-        known.then_some(self.multiplier() * c * scalar < 0.0)
+        let c = point.coefficient;
+        if self.kind == Kind::Fold || !c.is_finite() {
+            return None;
+        }
+        let scalar = point.border.scalar();
+        (scalar.abs() > NONE).then_some(self.multiplier() * c * scalar < 0.0)
     }
 
     /// The coefficient `w v c`; none where the sequence of phases changes nearby.

@@ -9,6 +9,8 @@ use std::f64::consts::TAU;
 use nalgebra::{Matrix2, Vector2};
 
 use super::course::Course;
+use super::edge::{self, Edge};
+use super::event::Kind;
 use super::phases::Phase;
 use super::smooth;
 use crate::integrate::State;
@@ -37,6 +39,8 @@ pub struct Image {
     pub phases: Vec<Phase>,
     /// Whether friction holds the pendulum at the end, and whether for ever.
     pub held: [bool; 2],
+    /// The numbers of the events that are watched.
+    pub edges: Vec<Edge>,
 }
 
 /// The map at one place of a course; `N` is 2 and the number of coordinates.
@@ -49,6 +53,7 @@ pub struct Period<'a, const N: usize> {
     count: usize,
     /// The problem for any model; none where equal steps do.
     ode: Option<OdeProblem<Tangent<f64, N>>>,
+    watched: Option<Kind>,
 }
 
 impl<'a, const N: usize> Period<'a, N> {
@@ -66,7 +71,7 @@ impl<'a, const N: usize> Period<'a, N> {
             if course.varies_friction() { ode.finding_turns() } else { ode }
         });
         let count = smooth::count(&pendulum, course.step);
-        Self { course, at: at.to_vec(), pendulum, count, ode }
+        Self { course, at: at.to_vec(), pendulum, count, ode, watched: None }
     }
 
     /// The number of equal steps that [`Period::new`] takes.
@@ -79,6 +84,13 @@ impl<'a, const N: usize> Period<'a, N> {
     #[must_use]
     pub fn by(mut self, count: usize) -> Self {
         self.count = count;
+        self
+    }
+
+    /// This map with the numbers of events of this kind along it, see [`edge`].
+    #[must_use]
+    pub fn watching(mut self, kind: Kind) -> Self {
+        self.watched = Some(kind);
         self
     }
 
@@ -107,11 +119,21 @@ impl<'a, const N: usize> Period<'a, N> {
         let by_omega = if self.pendulum.is_autonomous() { 0.0 } else { -TAU / omega.value.powi(2) };
         let start = [Tangent::seeded(state[0], 0), Tangent::seeded(state[1], 1)];
         let mut driver = Driver::new(ode, 0.0, start, part * whole);
-        let mut phases = Vec::new();
+        let (mut phases, mut edges) = (Vec::new(), Vec::new());
         while let Some(piece) = driver.advance() {
             let phase = match piece {
-                Piece::Step => Phase::moving(driver.dense.signs[0]),
-                Piece::Rest(..) => Phase::Stick,
+                Piece::Step => {
+                    let stops = driver.events.last().is_some_and(|stop| stop.tau >= driver.tau);
+                    let watched = self.watched;
+                    edges.extend(watched.and_then(|kind| edge::passed(kind, ode, &driver, stops)));
+                    Phase::moving(driver.dense.signs[0])
+                }
+                Piece::Rest(from, to) => {
+                    if self.watched.is_some() {
+                        edges.extend(edge::held(ode, &driver, [from, to]));
+                    }
+                    Phase::Stick
+                }
             };
             if self.rubs() && phases.last() != Some(&phase) {
                 phases.push(phase);
@@ -131,7 +153,7 @@ impl<'a, const N: usize> Period<'a, N> {
         let shrinking = (-self.pendulum.gamma * part * whole).exp();
         let product = even.then_some(shrinking * driver.ratio);
         let held = [driver.is_stuck(), driver.is_stuck_for_ever()];
-        Image { phases, held, ..Image::of(&end, product) }
+        Image { phases, held, edges, ..Image::of(&end, product) }
     }
 }
 
@@ -148,6 +170,7 @@ impl Image {
             product,
             phases: Vec::new(),
             held: [false; 2],
+            edges: Vec::new(),
         }
     }
 }

@@ -1,5 +1,6 @@
 //! The curves in the plane of two coordinates, from some of their points on.
 
+use std::f64::consts::PI;
 use std::sync::atomic::AtomicBool;
 
 use nalgebra::DVector;
@@ -17,6 +18,8 @@ use crate::model::pendulum::Symmetry;
 
 /// Largest distance of the end of a curve of folds from the point of codimension 2 that it ends at.
 const MEETS: f64 = 0.05;
+/// Largest distance of an end from the point of a curve where slips and sticks change that it is at.
+const REACHES: f64 = 1e-4;
 /// Distances along the null vector at which a curve of folds is begun, the first that succeeds.
 const DISTANCES: [f64; 5] = [3e-2, 1e-2, 3e-3, 1e-3, 1e-1];
 
@@ -126,11 +129,17 @@ impl Plane {
             self.grow(next, cancel)?;
             next += 1;
         }
+        self.reach();
         Ok(next > from)
     }
 
     fn add_alone(&mut self, seed: &Seed, cancel: &AtomicBool) -> Result<(), Error> {
         let (mut of, mut points) = (seed.of, seed.points.clone());
+        if seed.kind == Kind::RestBoundary {
+            // The same for all orbits that it swallows.
+            let centre = PI * (points[0][0] / PI).round();
+            of = Type { n: 1, w: 0, closure: Closure::Rest, centre };
+        }
         if of.w < 0 && self.symmetry == Some(Symmetry::AtOnce) {
             // Its mirror image.
             of.w = -of.w;
@@ -170,6 +179,9 @@ impl Plane {
         for end in [0, 1] {
             let curve = &self.curves[index];
             let (of, kind) = (curve.of, curve.kind);
+            if kind != Kind::Fold {
+                continue;
+            }
             let Some(met) = curve.near[end].clone() else { continue };
             let born = |kind: &Kind| {
                 self.critical(met.of, *kind)
@@ -184,7 +196,8 @@ impl Plane {
                 let seed = Seed { of, kind: parent, points: points.clone(), at, along };
                 self.add_alone(&seed, cancel)?;
             }
-            let Some(found) = self.nearest(&met, parent) else { continue };
+            let on_parent = |curve: &Curve, _| curve.kind == parent;
+            let Some(found) = self.nearest(met.of, met.at, MEETS, on_parent) else { continue };
             let (number, point) = found;
             let begin = self.critical(met.of, parent);
             let child = self.critical(of, kind);
@@ -199,17 +212,39 @@ impl Plane {
         Ok(())
     }
 
-    /// The point of codimension 2 nearest to what a curve has met.
-    fn nearest(&self, met: &Met, kind: Kind) -> Option<(usize, usize)> {
-        let mut best: Option<(f64, (usize, usize))> = None;
-        for (number, curve) in self.curves.iter().enumerate() {
-            if curve.kind != kind || !curve.of.is_like(&met.of) {
-                continue;
+    /// Joins ends of curves to the points of curves where slips and sticks change that they reach.
+    fn reach(&mut self) {
+        for index in 0..self.curves.len() {
+            for end in [0, 1] {
+                let curve = &self.curves[index];
+                let stops = matches!(curve.ends[end], End::Lost(_) | End::Phases | End::Crossing);
+                let last = if end == 0 { curve.points.first() } else { curve.points.last() };
+                let Some(last) = last.filter(|_| stops) else { continue };
+                let at = Critical::at(&last.orbit.place);
+                let reached = Degenerate::Reached(curve.kind);
+                let found = self.nearest(curve.of, at, REACHES, |_, kind| kind == reached);
+                if found.is_some() {
+                    let curve = &mut self.curves[index];
+                    (curve.ends[end], curve.meets[end]) = (End::Phases, found);
+                }
             }
-            for (k, (_, index)) in curve.degenerate.iter().enumerate() {
+        }
+    }
+
+    /// The point of codimension 2 nearest to coordinates on curves of one type, of those that are wanted.
+    fn nearest(
+        &self,
+        of: Type,
+        near: [f64; 2],
+        within: f64,
+        wanted: impl Fn(&Curve, Degenerate) -> bool,
+    ) -> Option<(usize, usize)> {
+        let mut best: Option<(f64, (usize, usize))> = None;
+        for (number, curve) in self.curves.iter().enumerate().filter(|one| one.1.of.is_like(&of)) {
+            for (k, (kind, index)) in curve.degenerate.iter().enumerate() {
                 let at = Critical::at(&curve.points[*index].orbit.place);
-                let apart = (at[0] - met.at[0]).hypot(at[1] - met.at[1]);
-                if apart < best.map_or(MEETS, |(least, _)| least) {
+                let apart = (at[0] - near[0]).hypot(at[1] - near[1]);
+                if wanted(curve, *kind) && apart < best.map_or(within, |(least, _)| least) {
                     best = Some((apart, (number, k)));
                 }
             }

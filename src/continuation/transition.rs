@@ -104,15 +104,15 @@ impl Cycles<'_> {
 }
 
 /// Adds two orbits between which the phases change, and what happens there.
-pub(super) fn crossed(run: &mut Run, before: &Orbit, after: Orbit) {
+pub(super) fn crossed(cycles: &Cycles<'_>, run: &mut Run, before: &Orbit, after: Orbit) {
     let orbit = run.orbits.len() - 1;
     let mut kinds: Vec<Kind> = kind(&before.phases, &after.phases).into_iter().collect();
     let last = before.tangent.len() - 1;
     if before.tangent[last] * after.tangent[last] < 0.0 {
         kinds.push(Kind::Fold);
     } else if before.tests[1] * after.tests[1] < 0.0 {
-        // Where the branch turns back no orbit is left to double.
-        kinds.push(Kind::PeriodDoubling);
+        // Where the branch turns back no orbit is left to shed another one.
+        kinds.push(cycles.at_minus_one());
     }
     let rises = (after.tests[1] - before.tests[1]).signum();
     let event = |kind| Event { kind, orbit, rises, supercritical: None, smooth: false };

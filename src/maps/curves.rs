@@ -1,4 +1,4 @@
-//! The bifurcation set of a plane: curves of folds, doublings and symmetry breakings.
+//! The bifurcation set of a plane: curves of folds, doublings, symmetry breakings and changes of slips and sticks.
 //!
 //! Branches are followed along sections of the plane: first along its edges, where every curve ends that does not end within,
 //! then in both directions in turn, each in the largest gap that the golden section leaves. On a section all orbits are
@@ -13,6 +13,7 @@ use crate::continuation::event::Kind;
 use crate::continuation::family::Family;
 use crate::continuation::plane::{Plane, Seed};
 use crate::error::Error;
+use crate::orbit::PeriodicOrbit;
 
 /// Sections at least, at most, and in a row without a new curve.
 const LEAST: usize = 6;
@@ -36,6 +37,8 @@ const GOLDEN: f64 = 0.618_033_988_749_894_9;
 pub struct Request {
     /// Longest period of orbits.
     pub longest: usize,
+    /// Periods and net turns of the orbits that are searched and whose curves are followed; none for all.
+    pub only: Option<Vec<(usize, i64)>>,
     /// Workers; 0 for one a processor.
     pub threads: usize,
 }
@@ -122,7 +125,10 @@ impl Curves {
             let known = family.branches.len();
             let pendulum = family.pendulum(at);
             let all = every_orbit(&pendulum, request.longest, request.threads, control)?;
-            for orbit in &all {
+            let wants = |orbit: &&PeriodicOrbit| {
+                request.only.as_ref().is_none_or(|types| types.contains(&(orbit.n, orbit.w)))
+            };
+            for orbit in all.iter().filter(wants) {
                 section.orbits += 1;
                 if !family.passes(orbit, at) {
                     family.add(orbit, at, control.flag())?;
@@ -145,8 +151,9 @@ impl Curves {
         let before = self.plane.curves.len();
         for branch in &family.branches {
             let cycles = family.cycles(branch.of);
-            for event in branch.run.events.iter().filter(|event| event.smooth) {
-                if !matches!(event.kind, Kind::Fold | Kind::PeriodDoubling | Kind::SymmetryBreaking)
+            for event in &branch.run.events {
+                // What a jump of a multiplier does is said by the curve of the jump.
+                if event.smooth == event.kind.is_of_friction() || event.kind == Kind::NeimarkSacker
                 {
                     continue;
                 }

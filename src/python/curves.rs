@@ -1,10 +1,11 @@
 //! Bindings of the bifurcation set of a plane.
 
 use numpy::{PyArray1, PyArray2};
-use pendmap::attractor::Kind;
+use pendmap::attractor::Kind as OrbitKind;
 use pendmap::continuation::course::{Course, Law};
 use pendmap::continuation::critical::Critical;
 use pendmap::continuation::cycle::{Closure, Type};
+use pendmap::continuation::event::Kind;
 use pendmap::continuation::plane::Plane;
 use pendmap::error::Error;
 use pendmap::maps::curves::{Request, Section, curves as search};
@@ -40,6 +41,8 @@ pub struct BifurcationSet {
     velocity: Array<f64>,
     multipliers: Py<PyArray2<f64>>,
     supercritical: Array<i32>,
+    /// What a jump of a multiplier does there: nothing, a fold, a period doubling, a symmetry breaking.
+    jump: Array<i32>,
     /// Of each point of codimension 2: what it is, and its place.
     degenerate_kind: Vec<&'static str>,
     degenerate_place: Array<i32>,
@@ -55,8 +58,8 @@ pub struct BifurcationSet {
     regions: Vec<(usize, f64, f64, f64, i16)>,
 }
 
-/// Curves of folds, period doublings and symmetry breakings of orbits up to the period `longest` in the plane of two axes;
-/// with `regions` also where how many are stable.
+/// Curves of folds, period doublings, symmetry breakings and changes of slips and sticks of orbits up to the period `longest`
+/// in the plane of two axes; with `regions` also where how many are stable.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)] // what Python passes, and the interpreter
 #[pyo3(signature = (model, axes, longest, regions, threads, progress=None))]
@@ -78,7 +81,7 @@ pub fn bifurcation_set(
     };
     let axes = vec![axis(axes.0).map_err(raise)?, axis(axes.1).map_err(raise)?];
     let course = Course::new(base, axes);
-    let request = Request { longest, threads };
+    let request = Request { longest, only: None, threads };
     let (found, layers) = interruptible(py, progress.as_ref(), |control| {
         let mut found = search(&course, &request, control)?;
         let layers = if regions { pieces(&mut found, &request, control)? } else { Vec::new() };
@@ -99,7 +102,7 @@ impl BifurcationSet {
         let sign = |known: Option<bool>| known.map_or(-1, i32::from);
         let (mut curve, mut at, mut multipliers, mut supercritical) =
             (vec![], vec![], vec![], vec![]);
-        let (mut theta, mut velocity) = (vec![], vec![]);
+        let (mut theta, mut velocity, mut jump) = (vec![], vec![], vec![]);
         let (mut degenerate_kind, mut degenerate_place) = (vec![], vec![]);
         // Number of the first point of codimension 2 of each curve.
         let mut first = Vec::new();
@@ -117,8 +120,17 @@ impl BifurcationSet {
                 curve.push(number as i32);
                 at.push(Critical::at(&point.orbit.place).to_vec());
                 let pair = critical.cycles.multipliers(&point.orbit).0;
-                multipliers.push(pair.iter().flat_map(|m| [m.re, m.im]).collect::<Vec<f64>>());
+                // What is held is a set.
+                let size = if one.kind == Kind::RestBoundary { f64::NAN } else { 1.0 };
+                let parts = pair.iter().flat_map(|m| [m.re * size, m.im * size]);
+                multipliers.push(parts.collect::<Vec<f64>>());
                 supercritical.push(sign(critical.is_supercritical(point)));
+                jump.push(match critical.jumped(point) {
+                    None => 0,
+                    Some(Kind::Fold) => 1,
+                    Some(Kind::PeriodDoubling) => 2,
+                    Some(_) => 3,
+                });
             }
         }
         let meets = |of: Option<(usize, usize)>| of.map_or(-1, |(c, k)| (first[c] + k) as i32);
@@ -152,6 +164,7 @@ impl BifurcationSet {
             velocity: array(py, velocity),
             multipliers: PyArray2::from_vec2(py, &multipliers)?.unbind(),
             supercritical: array(py, supercritical),
+            jump: array(py, jump),
             degenerate_kind,
             degenerate_place: array(py, degenerate_place),
             sections: sections.iter().map(|s| (s.held.0, s.held.1, s.orbits, s.new)).collect(),
@@ -166,10 +179,10 @@ impl BifurcationSet {
 /// The kind of the orbits of a type.
 fn kind(Type { w, closure, centre, .. }: Type) -> &'static str {
     let kind = match (w, closure) {
-        (0, Closure::Rest) if centre.cos() > 0.0 => Kind::Rest,
-        (0, Closure::Rest) => Kind::InvertedRest,
-        (0, _) => Kind::Oscillation,
-        _ => Kind::Rotation,
+        (0, Closure::Rest) if centre.cos() > 0.0 => OrbitKind::Rest,
+        (0, Closure::Rest) => OrbitKind::InvertedRest,
+        (0, _) => OrbitKind::Oscillation,
+        _ => OrbitKind::Rotation,
     };
     kind.word()
 }

@@ -136,7 +136,7 @@ fn the_fold_of_the_oscillation_begins_where_the_doubling_of_rest_changes() {
 #[test]
 fn curves_of_a_part_of_the_plane_have_regions_with_their_stable_orbits() {
     let base = Pendulum::new(0.1, 1.0, 2.0, 0.0, 0.0).unwrap();
-    let request = Request { longest: 2, threads: 1 };
+    let request = Request { longest: 2, only: None, threads: 1 };
     let law = |[low, high]: [f64; 2]| Law::Quadratic([low, high - low, 0.0]);
     let axes =
         vec![vec![(Parameter::P, law([0.0, 1.6]))], vec![(Parameter::Omega, law([1.8, 2.2]))]];
@@ -182,7 +182,7 @@ fn a_branch_has_few_steps_where_motions_part_within_a_period() {
 #[test]
 fn without_damping_no_curve_lies_where_nothing_drives() {
     let base = Pendulum::new(0.0, 1.0, 2.0, 0.0, 0.0).unwrap();
-    let request = Request { longest: 1, threads: 1 };
+    let request = Request { longest: 1, only: Some(vec![(1, 0), (1, 1)]), threads: 1 };
     let law = |[low, high]: [f64; 2]| Law::Quadratic([low, high - low, 0.0]);
     let axes =
         vec![vec![(Parameter::P, law([0.0, 1.5]))], vec![(Parameter::Omega, law([1.5, 2.5]))]];

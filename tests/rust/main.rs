@@ -29,6 +29,7 @@ mod continued_plans;
 mod convergence_order;
 mod corners;
 mod curves;
+mod curves_friction;
 mod edge_cases;
 mod effects;
 mod effects_as_formulas;

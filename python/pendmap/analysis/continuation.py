@@ -137,8 +137,9 @@ def continuation(  # noqa: PLR0913 (physics first, numerical choices by name)
 
     With two parameters: curves of folds, period doublings and symmetry breakings in their plane, of
     all orbits up to some period and of both rests, from sections in both directions until several
-    in a row have no event off the curves. Points of codimension 2 are located: cusps, and where a
-    doubling or a symmetry breaking changes between super- and subcritical.
+    in a row have no event off the curves; under dry friction also of the changes of slips and
+    sticks. Points of codimension 2 are located: cusps, where a doubling or a symmetry breaking
+    changes between super- and subcritical, and where a curve reaches a change of slips and sticks.
 
     Parameters
     ----------
@@ -179,8 +180,11 @@ def continuation(  # noqa: PLR0913 (physics first, numerical choices by name)
         their rate ``backbone_value``: ``k`` swings in ``n`` periods lie near ``n/k`` times it.
 
         Of two parameters, ``curve``: ``kind``, ``n``, ``w``, ``symmetric``, ``begin``, ``end``;
-        their ``place``: ``curve``, ``theta``, ``velocity``, ``multipliers``, ``supercritical`` and
-        both parameters; points of codimension 2, ``degenerate``: ``kind``, ``n`` and so on.
+        their ``place``: ``curve``, ``theta``, ``velocity``, ``multipliers``, ``supercritical``,
+        ``jump`` (what a jump of a multiplier does as slips and sticks change) and both parameters;
+        points of codimension 2, ``degenerate``: ``kind``, ``n`` and so on. ``stable_count``, over
+        ``type`` and a lattice of both parameters: how many orbits of a type are stable; ``region``:
+        ``type``, ``stable``, ``part`` of the plane, and a point inside.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The bifurcation set of a plane: curves of folds, period doublings and symmetry breakings."""
+"""The bifurcation set of a plane: curves of folds, doublings and other events of orbits."""
 
 from __future__ import annotations
 
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 LONGEST = 16  # Longest period of orbits whose curves are followed, in forcing periods
 LISTED = 16  # Largest number of points in a summary
 CRITICALITY = {-1: "no meaning", 0: "subcritical", 1: "supercritical"}
+JUMPS = {0: "none", 1: "fold", 2: "period_doubling", 3: "symmetry_breaking"}
 
 
 def entries(dataset: xr.Dataset) -> list[dict[str, Any]]:
@@ -40,6 +41,8 @@ def entries(dataset: xr.Dataset) -> list[dict[str, Any]]:
         mine = owner == number
         entry["symmetric"] = bool(entry["symmetric"])
         entry["ends"] = [entry.pop("begin"), entry.pop("end")]
+        jumps = (JUMPS[one] for one in dataset["place_jump"].values[mine].tolist())
+        entry["jumps"] = [None if one == "none" else one for one in jumps]
         entry["values"] = {name: dataset[f"place_{name}"].values[mine].tolist() for name in varied}
     return listed
 
@@ -122,6 +125,7 @@ def variables(raw: _core.BifurcationSet, axes: tuple[Varied, ...], units: Units)
         "place_supercritical": flag(
             "place", raw.supercritical, "whether new orbits live beyond it", CRITICALITY
         ),
+        "place_jump": flag("place", raw.jump, "what a jump of a multiplier does there", JUMPS),
         "degenerate_kind": variable(
             "degenerate", np.array(raw.degenerate_kind, dtype=str), long_name="what it is"
         ),
@@ -149,7 +153,8 @@ def summary(dataset: xr.Dataset) -> list[str]:
     """Return the lines that say what was found."""
     kinds = dataset["curve_kind"].values.tolist()
     of_kind = [
-        f"{counted(kinds.count(kind), 'curve')} of {kind.replace('_', ' ')}s"
+        f"{counted(kinds.count(kind), 'curve')} of "
+        + f"{kind.replace('_', ' ')}s".replace("ys", "ies")
         for kind in dict.fromkeys(kinds)
     ]
     varied = _varied(dataset)

@@ -147,9 +147,10 @@ def _entropies(dataset: xr.Dataset, dim: str) -> list[Mark]:
     known = dataset["boundary_boxes"].values > 0
     edge = np.where(known, dataset["boundary_basin_entropy"].values, np.nan)
     text = "of the boundary (dashed: ln 2, fractal above)"
+    indigo, _ = palette.CURVES["period_doubling"]
     return [
         Level(math.log(2), colour=QUIET, dash="--"),
-        Line(x, whole, colour=palette.CURVES[2], name="basin entropy", path="whole"),
+        Line(x, whole, colour=indigo, name="basin entropy", path="whole"),
         *_with_error(x, edge, dataset["boundary_basin_entropy_stderr"].values, "boundary", text),
     ]
 

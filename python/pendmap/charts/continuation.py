@@ -30,8 +30,7 @@ if TYPE_CHECKING:
 _COLOURS: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
 _GREY: Final = "#555555"
 _UNSTABLE: Final = {"colour": _GREY, "width": 0.7, "name": "unstable"}
-_KINDS: Final = ("fold", "period_doubling", "symmetry_breaking")
-_DASHES: Final[dict[str, Dash]] = dict(zip(_KINDS, ("-", DASHED, DOTTED), strict=True))
+_DASHES: Final[dict[str, Dash]] = {kind: dash or "-" for kind, (_, dash) in palette.CURVES.items()}
 _STEPS: Final = 401  # Values of a parameter, besides those of events, in a recording
 _SIDES: Final = ("theta", "velocity")
 _MOVING: Final = {
@@ -252,12 +251,14 @@ def bifurcation_set(
 ) -> list[Mark]:
     """Return the curves in the plane of two parameters and the points of codimension 2.
 
-    Dashes say what happens; lines are thin where the orbits born there are subcritical. Colours are
+    Dashes say what happens; lines are thin where the orbits born there are subcritical, thick where
+    a multiplier jumps over 1 or -1 as slips and sticks change. Colours are
     those of the orbits' types, or are given for what happens. ``to`` maps points, shape (m, 2).
     """
     if "curve_kind" not in dataset:
         return []
-    owner, sides = (dataset[f"place_{name}"].values for name in ("curve", "supercritical"))
+    names = ("curve", "supercritical", "jump")
+    owner, sides, jumps = (dataset[f"place_{name}"].values for name in names)
     places, degenerate = (
         to(np.stack([dataset[f"{which}_{name}"].values for name in over], axis=-1))
         for which in ("place", "degenerate")
@@ -275,9 +276,10 @@ def bifurcation_set(
         of: dict[str, Any] = {"colour": (colours or {}).get(kind, colour), "dash": _DASHES[kind]}
         points, first = smooth(places[mine])
         # Where new orbits change their side the coefficient has no sign.
-        thin = (sides[mine] == 0)[first + changes[mine][first]]
+        thin, thick = (one[mine][first + changes[mine][first]] for one in (sides == 0, jumps > 0))
         path = f"{name}/{kind}/{number}".replace(" ", "_").replace(":", "_")
-        for width, shown, at in ((1.5, ~thin, path), (0.6, thin, f"{path}/subcritical")):
+        looks = (1.5, ~(thin | thick), path), (0.6, thin, f"{path}/subcritical")
+        for width, shown, at in (*looks, (2.8, thick, f"{path}/jump")):
             # A piece belongs to both looks at the point where it changes.
             near = shown | np.roll(shown, 1) & (np.arange(shown.size) > 0)
             x, y = np.where(near[:, None], points, np.nan).T
@@ -291,6 +293,8 @@ def bifurcation_set(
         marks.append(Line(NONE, NONE, colour=shade, dash=_DASHES[kind], name=text))
     if (sides == 0).any():
         marks.append(Line(NONE, NONE, colour=INK, width=0.6, name="thin: subcritical"))
+    if jumps.any():
+        marks.append(Line(NONE, NONE, colour=INK, width=2.8, name="thick: a multiplier jumps"))
     special = dataset["degenerate_kind"].values
     at_kind = ((one, degenerate[special == one]) for one in dict.fromkeys(special.tolist()))
     return [*marks, *lines, *(_events(kind, *at.T) for kind, at in at_kind)]

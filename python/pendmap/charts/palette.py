@@ -39,7 +39,8 @@ _NAMES: Final[dict[str, str]] = (
 
 _SHAPES = {"oscillation": "sPXph8", "inverted_rest": "D"}  # Markers by kind; others have a disc
 MARKERS: Final[dict[str, str]] = _TABLES["markers"]  # Of events, and of codimension 2
-CURVES = ("#e6007e", "#19d3f3", "#5a1fd1")  # Colours of curves on maps, which no attractor has
+CURVES: Final = {kind: (str(one), tuple(dash)) for kind, (one, *dash) in _TABLES["curves"].items()}
+"""Colour on maps and dash of curves by what happens there."""
 
 _LAPS = ((0, 0.35), (255, 0.5), (0, 0.6), (255, 0.72), (0, 0.18), (255, 0.25))
 """Grey that a family's colours are mixed with on repetition, and its share."""

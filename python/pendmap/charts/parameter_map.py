@@ -116,8 +116,7 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 1200) -
     leading = ("kinds", "certainty" if "certainty" in dataset else "exponent")
     others = [one for one in _RECORDED if one in known and one not in leading]
     varied = str(dataset.attrs["columns"]), str(dataset.attrs["rows"])
-    kinds_of_curves = ("symmetry_breaking", "fold", "period_doubling")
-    shades = dict(zip(kinds_of_curves, palette.CURVES, strict=True))
+    shades = {kind: shade for kind, (shade, _) in palette.CURVES.items()}
     lines = bifurcation_set(dataset, varied, shades, halo="#ffffff", order=2.0)
 
     def make(name: str, across: Ends, up: Ends) -> tuple[str, list[Mark]]:

@@ -9,6 +9,8 @@ import pytest
 
 import pendmap
 from pendmap.analysis import continuation, curves
+from pendmap.charts import registry
+from pendmap.charts.marks import Line
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -55,6 +57,38 @@ def test_the_json_object_has_curves_and_points(plane: xr.Dataset) -> None:
     assert set(answer["curves"][0]["values"]) == {"p", "omega"}
     assert {"kind", "n", "w", "values"} <= set(answer["points"][0])
     assert answer["branches"] == []
+
+
+@pytest.fixture(scope="module")
+def rough() -> xr.Dataset:
+    pendulum = pendmap.Pendulum(gamma=0.05, omega=1.0, theta_r=0.4)
+    ranges = {"p": (2.3, 2.5), "omega": (1.1, 1.2)}
+    return pendmap.continuation(pendulum, ranges, up_to=1, threads=1)
+
+
+def test_a_doubling_reaches_the_curve_where_its_multiplier_begins_to_jump(
+    rough: xr.Dataset,
+) -> None:
+    answer = continuation.SCHEMA.json(rough)
+    curves = {one["kind"]: one for one in answer["curves"] if one["n"] == one["w"] == 1}
+    grazing, doubling = curves["grazing"], curves["period_doubling"]
+    (point,) = [one for one in answer["points"] if one["kind"] == "period_doubling_at_event"]
+    assert "slips and sticks change" in doubling["ends"]
+    ends = [[doubling["values"][name][k] for name in ("p", "omega")] for k in (0, -1)]
+    at = [point["values"][name] for name in ("p", "omega")]
+    assert min(np.hypot(*np.subtract(end, at)) for end in ends) < 1e-5
+    # The doubling jumps on one side of the point alone.
+    jumps = [one == "period_doubling" for one in grazing["jumps"]]
+    beyond = [p > at[0] for p in grazing["values"]["p"]]
+    away = np.abs(np.subtract(grazing["values"]["p"], at[0])) > 1e-9
+    assert np.array_equal(np.array(jumps)[away], np.array(beyond)[away])
+    assert len(set(jumps)) == 2
+
+
+def test_the_figure_names_changes_of_slips_and_sticks(rough: xr.Dataset) -> None:
+    (panel,) = registry.build(registry.ready(rough)).panels
+    shown = {mark.name for mark in panel.marks if isinstance(mark, Line)}
+    assert {"grazing", "thick: a multiplier jumps"} <= shown
 
 
 def test_a_period_out_of_range_is_refused() -> None:
