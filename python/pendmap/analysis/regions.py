@@ -77,32 +77,34 @@ def entries(dataset: xr.Dataset) -> list[dict[str, Any]]:
 
 
 def _named(dataset: xr.Dataset, number: int) -> dict[str, Any]:
-    """Return name, period and net turns of a type of orbits."""
+    """Return name, kind, period and net turns of a type of orbits."""
     kind, n, w = (dataset[f"type_{key}"].values[number].item() for key in ("kind", "n", "w"))
-    return {"name": _core.Attractor(kind, n, w).name, "n": n, "w": w}
+    return {"name": _core.Attractor(kind, n, w).name, "kind": kind, "n": n, "w": w}
 
 
 def stable_orbits(dataset: xr.Dataset, at: Mapping[str, float]) -> list[dict[str, Any]]:
     """Return the types of orbits of which some are stable at a point of the plane, and how many.
 
     The number is that of the nearest point of the lattice from which no curve at which it changes
-    parts the point; None where there is no such point, or searches differ.
+    parts the point; None where there is no such point, or searches differ. Outside the plane there
+    are none.
     """
     varied, stable = str(dataset.attrs["varied"]).split(", "), dataset["stable_count"].values
     low, high = np.array(dataset.attrs["low"]), np.array(dataset.attrs["high"])
     side = stable.shape[-1]
     here = (np.array([at[name] for name in varied]) - low) / (high - low) * side - 0.5
+    if (np.abs(here + 0.5 - side / 2) > side / 2).any():
+        return []
     near = np.clip(np.floor(here), 0, side - 2) + np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
     near = near[np.argsort(np.linalg.norm(near - here, axis=1))]
     places = np.stack([dataset[f"place_{name}"].values for name in varied], axis=-1)
-    lines = [
-        smooth(places[dataset["place_curve"].values == k])[0] for k in range(dataset.sizes["curve"])
-    ]
-    lines = [(line - low) / (high - low) * side - 0.5 for line in lines]
+    places, owner = (places - low) / (high - low) * side - 0.5, dataset["place_curve"].values
+    lines = [places[owner == k] for k in range(dataset.sizes["curve"])]
+    lines = [smooth(line)[0] if len(line) > 1 else line for line in lines]
     listed = []
     for number in range(stable.shape[0]):
-        own = dataset["border_curve"].values[dataset["border_type"].values == number]
-        free = [c for c in near if not any(_crosses(lines[k], here, c) for k in own)]
+        borders = dataset["border_curve"].values[dataset["border_type"].values == number]
+        free = [c for c in near if not any(_crosses(lines[k], here, c) for k in borders)]
         count = stable[number, int(free[0][1]), int(free[0][0])] if free else -1
         if count != 0:
             entry = _named(dataset, number) | {"stable": result.none_below_0(int(count))}

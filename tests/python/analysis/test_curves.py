@@ -50,6 +50,25 @@ def test_the_doubling_of_rest_changes_where_a_fold_begins(plane: xr.Dataset) -> 
     assert near.any()
 
 
+def test_regions_say_how_many_orbits_are_stable(plane: xr.Dataset) -> None:
+    def listed(p: float, omega: float) -> list[tuple[str, int | None]]:
+        every = continuation.stable_orbits(plane, {"p": p, "omega": omega})
+        return sorted((one["name"], one["stable"]) for one in every)
+
+    rotations = [("rotation 1:+1", 1), ("rotation 1:-1", 1)]
+    # At omega 2 born at .416787572822 and doubled at 1.346858522521: nearer than the lattice.
+    assert listed(0.41678, 2.0) == []
+    assert listed(0.41680, 2.0) == rotations
+    assert listed(1.34685, 2.0) == rotations
+    assert listed(1.34687, 2.0) == []
+    assert listed(0.1, 1.85) == [("rest", 1)]
+    assert listed(1.7, 2.0) == []
+    regions = continuation.SCHEMA.json(plane)["regions"]
+    assert {"name", "n", "w", "stable", "part", "values"} <= set(regions[0])
+    whole = sum(one["part"] for one in regions if one["name"] == "rest")
+    assert whole == pytest.approx(1.0, abs=0.01)
+
+
 def test_the_json_object_has_curves_and_points(plane: xr.Dataset) -> None:
     answer = continuation.SCHEMA.json(plane)
     assert len(answer["curves"]) == plane.sizes["curve"]
