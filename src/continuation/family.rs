@@ -198,8 +198,10 @@ impl Family {
             for number in 0..self.branches[next].run.events.len() {
                 let branch = &self.branches[next];
                 let Event { kind, orbit, rises, smooth, .. } = branch.run.events[number];
+                if !smooth {
+                    continue;
+                }
                 let cycles = self.cycles(branch.of);
-                let other = branch.run.beside(orbit);
                 let orbit = &branch.run.orbits[orbit];
                 if kind == Kind::NeimarkSacker {
                     let supercritical = cycles.sheds_stable_curve(orbit);
@@ -215,19 +217,12 @@ impl Family {
                 let both =
                     kind == Kind::SymmetryBreaking && self.symmetry != Some(Symmetry::AtOnce);
                 let senses: &[f64] = if both { &[1.0, -1.0] } else { &[1.0] };
-                let shed = |sense: f64| {
-                    if smooth {
-                        return cycles.shed(orbit, kind, sense);
-                    }
-                    let pair = if sense > 0.0 { [orbit, other?] } else { [other?, orbit] };
-                    cycles.shed_at_jump(pair, kind)
-                };
                 let rest = branch.of.closure == Closure::Rest;
                 let begin = if rest { End::Rest } else { End::Parent };
                 let mut side = None;
                 let mut new = Vec::new();
                 for sense in senses {
-                    let Some(shed) = shed(*sense) else { continue };
+                    let Some(shed) = cycles.shed(orbit, kind, *sense) else { continue };
                     side = Some(shed.side);
                     if self.end_at(of, &place.0, place.1).is_none() && of.n <= self.longest {
                         let cycles = self.cycles(of);
@@ -388,15 +383,6 @@ impl Cycles<'_> {
 }
 
 impl Run {
-    /// The nearest orbit with other phases than one of the run.
-    fn beside(&self, index: usize) -> Option<&Orbit> {
-        let here = &self.orbits[index];
-        let ends = [index.checked_sub(1), Some(index + 1)].into_iter().flatten();
-        let other = ends.filter_map(|k| self.orbits.get(k)).filter(|other| !other.is_like(here));
-        let away = |other: &Orbit| (&other.place - &here.place).norm();
-        other.min_by(|a, b| away(a).total_cmp(&away(b)))
-    }
-
     /// In the other sense.
     fn reversed(mut self) -> Self {
         self.orbits.reverse();

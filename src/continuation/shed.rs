@@ -3,10 +3,6 @@
 //! The closing map of the new orbits has the multiplier 1 there, and its eigenvector points to them. At the distance `e`
 //! along it the new orbit is at the coordinate `l + c e^2 + O(e^4)`: `c` is the normal form's coefficient over the speed
 //! at which the multiplier passes, and its sign says on which side the new orbits live.
-//!
-//! Where slips and sticks change and the multiplier jumps over -1, one lap of the new orbit is like the old one before the
-//! change, the other like that after it. Each lap is linear near by, so that the direction of the new orbits is the kernel of
-//! the system of both.
 
 use super::cycle::{Closure, Cycles, Orbit, Type};
 use super::event::Kind;
@@ -15,8 +11,6 @@ use crate::model::pendulum::Symmetry;
 
 /// Distances along the eigenvector at which the new branch is begun, the first that succeeds.
 const DISTANCES: [f64; 5] = [1e-2, 3e-3, 1e-3, 3e-4, 1e-4];
-/// Largest part of a distance by which Newton's method moves the first orbit that begins at a jump.
-const LINEAR: f64 = 0.1;
 /// Largest distance of the new orbit from the old one in those distances, and largest change of its multipliers.
 const STRAYED: f64 = 3.0;
 const TURNED: f64 = 0.5;
@@ -28,7 +22,7 @@ pub struct Shed {
     pub of: Type,
     /// The old orbit as one of the new type, and the first new one.
     pub orbits: [Orbit; 2],
-    /// The coefficient `c`; at a jump a number of its sign.
+    /// The coefficient `c`.
     pub side: f64,
 }
 
@@ -75,29 +69,6 @@ impl Cycles<'_> {
         });
         let (far, side) = first?;
         Some(Shed { of, orbits: [Orbit { tangent: row, ..old }, far], side })
-    }
-
-    /// What the orbit sheds where its slips and sticks become those of another one, and a multiplier jumps over -1.
-    #[must_use]
-    pub fn shed_at_jump(&self, both: [&Orbit; 2], kind: Kind) -> Option<Shed> {
-        let of = self.shed_type(kind)?;
-        let new = Cycles { of, ..*self };
-        let [mut points, after] = both.map(|orbit| self.repeated(orbit, &new));
-        let lap = points.len() / 2;
-        points[lap..].copy_from_slice(&after[lap..]);
-        let place = new.place(&points, self.at(&both[0].place));
-        let old = new.open(&place, &new.along())?;
-        let begun = |(sense, distance): (f64, f64)| {
-            let row = &old.tangent * sense;
-            let far = new.near(&(&place + &row * distance), &row)?;
-            let side = row[row.len() - 1];
-            let linear = far.moved < LINEAR * distance;
-            let orientation = far.orientation;
-            let old = Orbit { tangent: row, orientation, ..old.clone() };
-            linear.then_some(Shed { of, orbits: [old, far], side })
-        };
-        let mut all = DISTANCES.iter().flat_map(|distance| [(1.0, *distance), (-1.0, *distance)]);
-        all.find_map(begun)
     }
 
     /// The points of an orbit as one of another type that has it as a special case.

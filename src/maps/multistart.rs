@@ -54,7 +54,8 @@ struct Cell {
 }
 
 /// Points from which Newton's method should find all places in the box at which the field is a number of turns from the
-/// least to the most, in its first component; with this number. Those where the field is nearly linear come first.
+/// least to the most, in its first component; with this number. Of more than `most` those where the
+/// field is nearly linear come first.
 ///
 /// # Errors
 /// Errors of `field`, which is evaluated at many points at once.
@@ -109,7 +110,9 @@ pub(super) fn places(
         }
         (cells, size) = (smaller, half);
     }
-    cells.sort_by(|a, b| a.bend.total_cmp(&b.bend));
+    if cells.len() > most {
+        cells.sort_by(|a, b| a.bend.total_cmp(&b.bend));
+    }
     Ok(cells.iter().map(|cell| (cell.aim, cell.turns)).collect())
 }
 

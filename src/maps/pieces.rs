@@ -117,7 +117,9 @@ fn layers(
     for curve in &plane.curves {
         add(&mut layers, curve.of);
         let shed = plane.critical(curve.of, curve.kind).cycles.shed_type(curve.kind);
-        shed.into_iter().for_each(|of| add(&mut layers, of));
+        if let Some(of) = shed {
+            add(&mut layers, of);
+        }
     }
     let large = |(number, layer): (usize, &Layer)| {
         let large = layer.pieces.iter().filter(|piece| piece.points >= LEAST);
@@ -134,8 +136,8 @@ fn layers(
         }
         control.add(1);
     }
-    for (_, orbits) in searches.iter() {
-        orbits.iter().for_each(|(of, ..)| add(&mut layers, *of));
+    for (of, ..) in searches.iter().flat_map(|(_, orbits)| orbits) {
+        add(&mut layers, *of);
     }
     for layer in &mut layers {
         for number in 0..layer.pieces.len() {
@@ -272,7 +274,8 @@ fn divide(joined: &mut [Vec<bool>; 2], a: &Point, b: &Point) {
                 if line as f64 > low.max(high) {
                     break;
                 }
-                let part = if high == low { 0.0 } else { (line as f64 - low) / (high - low) };
+                // Not a number where the curve runs along the line.
+                let part = ((line as f64 - low) / (high - low)).max(0.0);
                 let along = (before[axis] + part * (here[axis] - before[axis])) * unit - 0.5;
                 if along >= 0.0 && along < unit - 1.0 {
                     let place = [along as usize, line];

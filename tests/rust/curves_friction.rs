@@ -3,7 +3,7 @@
 use pendmap::continuation::branch::{Bounds, End};
 use pendmap::continuation::course::{Course, Law};
 use pendmap::continuation::critical::Critical;
-use pendmap::continuation::event::{Event, Kind};
+use pendmap::continuation::event::Kind;
 use pendmap::continuation::period::Period;
 use pendmap::maps::branches::{Request as Along, Sought, branches};
 use pendmap::maps::control::Control;
@@ -68,37 +68,6 @@ fn curves_hold_the_events_along_one_parameter() {
         }
     }
     assert!(checked >= 5, "{checked} events");
-}
-
-#[test]
-fn a_doubled_orbit_begins_where_a_multiplier_jumps() {
-    let base = driven(0.05, 1.0, 1.18).with_friction(0.4).expect("in range");
-    let request = Along { sought: Sought::Type(1, 1), longest: 2, threads: 1 };
-    let bounds = Bounds { low: 2.4, high: 2.55 };
-    let course = Course::of(&base, Parameter::P);
-    let family = branches(&course, bounds, &request, &Control::default()).expect("branches").family;
-    let (number, parent) = (0, &family.branches[0]);
-    let jumps = |event: &Event| event.kind == Kind::PeriodDoubling && !event.smooth;
-    let event = parent.run.events.iter().position(jumps).expect("a jump");
-    let child = family.branches.iter().find(|one| one.meets.contains(&Some((number, event))));
-    let child = child.expect("a branch of doubled orbits");
-    assert_eq!((child.of.n, child.of.w), (2, 2));
-    let cycles = family.cycles(child.of);
-    let own = family.cycles(parent.of);
-    let at = own.at(&parent.run.orbits[parent.run.events[event].orbit].place);
-    // Its points part in proportion to the distance, on one side alone.
-    let part = |by: f64| {
-        let near = child.at(&cycles, at + by);
-        near.iter()
-            .map(|orbit| {
-                let points = cycles.points(&orbit.place);
-                (points[0][1] - points[1][1]).abs()
-            })
-            .fold(f64::INFINITY, f64::min)
-    };
-    let ratio = part(-1e-4) / part(-1e-5);
-    assert!((ratio - 10.0).abs() < 0.1, "{ratio}");
-    assert!(part(1e-4) > 0.1);
 }
 
 #[test]

@@ -259,8 +259,7 @@ def stable_orbits(dataset: xr.Dataset, value: float | Mapping[str, float]) -> li
     ``dataset`` is a result of :func:`pendmap.continuation` with ``up_to``; orbits are known up to
     that period. Each has ``name``, ``n``, ``w`` and ``branch``; twins and both senses of a rotation
     are there, what friction holds is not. Outside the range there are none. In two parameters,
-    given as a mapping, each entry is a type of orbits with their number ``stable``, None where it
-    is not known.
+    given as a mapping, each entry is a type of orbits with their number ``stable``.
     """
     if isinstance(value, Mapping):
         return in_plane.stable_orbits(dataset, value)

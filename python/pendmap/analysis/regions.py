@@ -10,6 +10,8 @@ from scipy.interpolate import PchipInterpolator
 
 from pendmap import _core
 from pendmap.analysis import result
+from pendmap.analysis.orbits import orbit
+from pendmap.analysis.varied import pendulum_of, with_values
 from pendmap.files.variables import variable
 
 if TYPE_CHECKING:
@@ -63,6 +65,7 @@ def variables(raw: _core.BifurcationSet, axes: tuple[Varied, ...]) -> dict[str, 
 
 def entries(dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return the regions of each type of orbits for the JSON object: how many are stable there."""
+    types = list(result.rows(dataset, "type_kind", "type_n", "type_w"))
     names = {"type": "region_type", "stable": "region_stable", "part": "region_part"}
     listed = result.records(dataset, **names)
     every = [
@@ -70,15 +73,14 @@ def entries(dataset: xr.Dataset) -> list[dict[str, Any]]:
         for name in str(dataset.attrs["varied"]).split(", ")
     ]
     for entry, values in zip(listed, zip(*every, strict=True), strict=True):
-        entry.update(_named(dataset, entry.pop("type")))
+        entry.update(_named(*types[entry.pop("type")]))
         entry["stable"] = result.none_below_0(entry["stable"])
         entry["values"] = dict(zip(str(dataset.attrs["varied"]).split(", "), values, strict=True))
     return listed
 
 
-def _named(dataset: xr.Dataset, number: int) -> dict[str, Any]:
+def _named(kind: str, n: int, w: int) -> dict[str, Any]:
     """Return name, kind, period and net turns of a type of orbits."""
-    kind, n, w = (dataset[f"type_{key}"].values[number].item() for key in ("kind", "n", "w"))
     return {"name": _core.Attractor(kind, n, w).name, "kind": kind, "n": n, "w": w}
 
 
@@ -86,8 +88,8 @@ def stable_orbits(dataset: xr.Dataset, at: Mapping[str, float]) -> list[dict[str
     """Return the types of orbits of which some are stable at a point of the plane, and how many.
 
     The number is that of the nearest point of the lattice from which no curve at which it changes
-    parts the point; None where there is no such point, or searches differ. Outside the plane there
-    are none.
+    parts the point; where there is none or its number is not known, that of a search at the point
+    itself. Outside the plane there are none.
     """
     varied, stable = str(dataset.attrs["varied"]).split(", "), dataset["stable_count"].values
     low, high = np.array(dataset.attrs["low"]), np.array(dataset.attrs["high"])
@@ -101,15 +103,19 @@ def stable_orbits(dataset: xr.Dataset, at: Mapping[str, float]) -> list[dict[str
     places, owner = (places - low) / (high - low) * side - 0.5, dataset["place_curve"].values
     lines = [places[owner == k] for k in range(dataset.sizes["curve"])]
     lines = [smooth(line)[0] if len(line) > 1 else line for line in lines]
-    listed = []
-    for number in range(stable.shape[0]):
+    totals: dict[tuple[str, int, int], int] = {}
+    doubtful = set()
+    for number, of in enumerate(result.rows(dataset, "type_kind", "type_n", "type_w")):
         borders = dataset["border_curve"].values[dataset["border_type"].values == number]
         free = [c for c in near if not any(_crosses(lines[k], here, c) for k in borders)]
-        count = stable[number, int(free[0][1]), int(free[0][0])] if free else -1
-        if count != 0:
-            entry = _named(dataset, number) | {"stable": result.none_below_0(int(count))}
-            listed.append(entry)
-    return listed
+        count = int(stable[number, int(free[0][1]), int(free[0][0])]) if free else -1
+        totals[of] = totals.get(of, 0) + count
+        doubtful |= {of} if count < 0 else set()
+    for kind, n, w in doubtful:
+        searched = orbit(with_values(pendulum_of(dataset), at), n=n, w=w)
+        alike = (searched["kind"].values == kind) & searched["stable"].values.astype(bool)
+        totals[kind, n, w] = int(alike.sum())
+    return [_named(*of) | {"stable": count} for of, count in totals.items() if count]
 
 
 def _crosses(line: Floats, a: Floats, b: Floats) -> bool:
