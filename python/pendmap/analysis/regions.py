@@ -35,6 +35,7 @@ def variables(raw: _core.BifurcationSet, axes: tuple[Varied, ...]) -> dict[str, 
     of, x, y, part, stable = (np.array(column) for column in zip(*raw.regions, strict=True))
     border = np.array(raw.borders, np.int32).reshape(-1, 2)
     counts, number = np.stack(raw.stable).reshape(-1, side, side), "number of the type"
+    text, (x_name, y_name) = ("stable orbits", "-1: not known"), (axis.name for axis in axes)
     data: dict[str, Any] = {
         "type_kind": variable("type", kinds, long_name="kind of orbits"),
         "type_n": variable("type", n, "periods", "smallest period"),
@@ -43,17 +44,8 @@ def variables(raw: _core.BifurcationSet, axes: tuple[Varied, ...]) -> dict[str, 
         "border_curve": variable("border", border[:, 1], "1", "curve at which stability changes"),
         "region_type": variable("region", of.astype(np.int32), "1", number),
         "region_part": variable("region", part, "1", "part of the plane"),
-        "region_stable": variable(
-            "region", stable.astype(np.int32), "1", "stable orbits", "-1: not known", missing=-1
-        ),
-        "stable_count": variable(
-            ("type", axes[1].name, axes[0].name),
-            counts,
-            "1",
-            "stable orbits",
-            "-1: not known",
-            missing=-1,
-        ),
+        "region_stable": variable("region", stable.astype(np.int32), "1", *text, missing=-1),
+        "stable_count": variable(("type", y_name, x_name), counts, "1", *text, missing=-1),
     }
     for axis, part in zip(axes, (x, y), strict=True):
         low, high = axis.values[[0, -1]]
@@ -68,14 +60,12 @@ def entries(dataset: xr.Dataset) -> list[dict[str, Any]]:
     types = list(result.rows(dataset, "type_kind", "type_n", "type_w"))
     names = {"type": "region_type", "stable": "region_stable", "part": "region_part"}
     listed = result.records(dataset, **names)
-    every = [
-        dataset[f"region_{name}"].values.tolist()
-        for name in str(dataset.attrs["varied"]).split(", ")
-    ]
+    varied = str(dataset.attrs["varied"]).split(", ")
+    every = [dataset[f"region_{name}"].values.tolist() for name in varied]
     for entry, values in zip(listed, zip(*every, strict=True), strict=True):
         entry.update(_named(*types[entry.pop("type")]))
         entry["stable"] = result.none_below_0(entry["stable"])
-        entry["values"] = dict(zip(str(dataset.attrs["varied"]).split(", "), values, strict=True))
+        entry["values"] = dict(zip(varied, values, strict=True))
     return listed
 
 
