@@ -140,6 +140,9 @@ def planes() -> None:
     ranges = {"p": (0.0, 2.5), "omega": (1.5, 3.0)}
     curves = continuation(Pendulum(), ranges, up_to=2)
     render.draw(curves, HERE / "bifurcation_set.png", dpi=110)
+    rubbing, ranges = Pendulum(gamma=0.05, theta_r=0.4), {"p": (1.0, 2.5), "omega": (0.8, 1.2)}
+    curves = continuation(rubbing, ranges, up_to=1)
+    render.draw(curves, HERE / "bifurcation_set_friction.png", dpi=110)
 
 
 def in_axes() -> None:

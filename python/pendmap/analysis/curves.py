@@ -158,9 +158,8 @@ def summary(dataset: xr.Dataset) -> list[str]:
         for kind in dict.fromkeys(kinds)
     ]
     varied = _varied(dataset)
-    lines = [
-        f"{', '.join(of_kind) or 'No curves'} of orbits up to {dataset.attrs['up_to']} periods."
-    ]
+    longest = counted(dataset.attrs["up_to"], "period")
+    lines = [f"{', '.join(of_kind) or 'No curves'} of orbits up to {longest}."]
     lines += degenerate_lines(dataset, varied)
     new = dataset["section_new"].values[::-1]
     quiet = int(np.argmax(new > 0)) if new.any() else new.size

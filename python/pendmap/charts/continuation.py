@@ -65,7 +65,9 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
         panels = [Panel("curves", "", across, up, marks)]
         steps = np.linspace(a["low"][1], a["high"][1], _STEPS)
         moving = recorded(panels, _critical(dataset, both, steps), *sides)
-        title = f"Bifurcations of orbits up to {a['up_to']} periods over {names.over(both)}"
+        title = (
+            f"Bifurcations of orbits up to {counted(a['up_to'], 'period')} over {names.over(both)}"
+        )
         look: dict[str, Any] = {"timeline": (both[1], steps), "size": (7.4, 5.6)}
         return Chart(title, names.parameters(a, both), [panels], recorded=moving, **look).only(
             layer
