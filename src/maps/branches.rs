@@ -1,7 +1,7 @@
 //! All branches of orbits of one type, or of all types up to a period, along a parameter.
 //!
-//! Orbits are searched as by [`super::orbits`] at sections of the range, each in the largest gap that the golden section
-//! leaves. A branch is followed through each orbit that none passes through yet, until several sections in a row have
+//! Orbits are searched as by [`super::orbits`] at sections of the range: beside its ends, where every branch ends that does
+//! not end within, then each in the largest gap that the golden section leaves. A branch is followed through each orbit that none passes through yet, until several sections in a row have
 //! had none. What a branch sheds is followed too.
 
 use super::control::Control;
@@ -18,9 +18,11 @@ use crate::model::pendulum::Symmetry;
 use crate::orbit::{PoincareMap, newton};
 
 /// Sections at least, at most, and in a row without a new branch.
-const LEAST: usize = 5;
+const LEAST: usize = 6;
 const MOST: usize = 40;
 const QUIET: usize = 3;
+/// Distance of the first sections from the ends, in parts of the range.
+const EDGE: f64 = 1e-3;
 /// Cells along a side of the box of a search, a period, of one type and of all, and periods counted.
 const CELLS: usize = 200;
 const FEWER: usize = 60;
@@ -104,7 +106,11 @@ pub fn branches(
             break;
         }
         control.check()?;
-        let part = (0.5 + 0.618_033_988_749_895 * k as f64).fract();
+        let part = match k {
+            0 => EDGE,
+            1 => 1.0 - EDGE,
+            _ => (0.5 + 0.618_033_988_749_895 * (k - 2) as f64).fract(),
+        };
         let at = bounds.low + part * (bounds.high - bounds.low);
         let pendulum = family.pendulum(at);
         let mut found = Vec::new();

@@ -66,7 +66,7 @@ type Search = (usize, Vec<(Type, usize, PeriodicOrbit)>);
 /// larger number are added to the others.
 ///
 /// # Errors
-/// The errors of [`every_orbit`].
+/// Errors of the search of orbits, as of [`super::orbits::orbits`].
 pub fn pieces(
     curves: &mut Curves,
     request: &Request,
