@@ -1,7 +1,7 @@
 //! All branches of orbits of one type, or of all types up to a period, along a parameter.
 //!
-//! Orbits are searched as by [`super::orbits`] at sections of the range: beside its ends, where every branch ends that does
-//! not end within, then each in the largest gap that the golden section leaves. A branch is followed through each orbit that none passes through yet, until several sections in a row have
+//! Orbits are searched as by [`super::orbits`] at sections of the range: in its middle, beside its ends, where every branch
+//! ends that does not end within, then each in the largest gap that the golden section leaves. A branch is followed through each orbit that none passes through yet, until several sections in a row have
 //! had none. What a branch sheds is followed too.
 
 use super::control::Control;
@@ -21,7 +21,7 @@ use crate::orbit::{PoincareMap, newton};
 const LEAST: usize = 6;
 const MOST: usize = 40;
 const QUIET: usize = 3;
-/// Distance of the first sections from the ends, in parts of the range.
+/// Distance of the sections beside the ends from these, in parts of the range.
 const EDGE: f64 = 1e-3;
 /// Cells along a side of the box of a search, a period, of one type and of all, and periods counted.
 const CELLS: usize = 200;
@@ -107,8 +107,9 @@ pub fn branches(
         }
         control.check()?;
         let part = match k {
-            0 => EDGE,
-            1 => 1.0 - EDGE,
+            0 => 0.5,
+            1 => EDGE,
+            2 => 1.0 - EDGE,
             _ => (0.5 + 0.618_033_988_749_895 * (k - 2) as f64).fract(),
         };
         let at = bounds.low + part * (bounds.high - bounds.low);

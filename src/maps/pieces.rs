@@ -73,6 +73,10 @@ pub fn pieces(
     control: &Control,
 ) -> Result<Vec<Layer>, Error> {
     let mut searches: Vec<Search> = Vec::new();
+    if !curves.plane.pendulum([0.5; 2]).is_dissipative() {
+        // Nothing attracts.
+        return Ok(Vec::new());
+    }
     for _ in 0..ROUNDS {
         let layers = layers(&curves.plane, &mut searches, request, control)?;
         let before = curves.plane.curves.len();

@@ -262,7 +262,7 @@ def stable_orbits(dataset: xr.Dataset, value: float | Mapping[str, float]) -> li
     given as a mapping, each entry is a type of orbits with their number ``stable``.
     """
     if isinstance(value, Mapping):
-        return in_plane.stable_orbits(dataset, value)
+        return in_plane.stable_orbits(dataset, value) if "stable_count" in dataset else []
     inside = [one["stable"] for one in regions(dataset) if one["from"] <= value <= one["to"]]
     return inside[0] if inside else []
 
