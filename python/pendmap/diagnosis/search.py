@@ -153,8 +153,8 @@ def _attempt(
     scores, losses = state.scores(reduced), state.hold_out_losses
     names = tuple(scores.name(k) for k in places)
     first = full.chosen[-len(names)]
-    effect = next(e for e in full.fit.model.effects if e.name == first.name)
-    shape = {name: effect.parameters[name] for name in first.shape}
+    fitted = {effect.name: effect.parameters for effect in full.fit.model.effects}
+    shape = {name: fitted[first.name][name] for name in first.shape}
     score = scores.together(places) / state.level
     fall = state.cost(reduced) - state.cost(full)
     pairs = zip(losses(reduced), losses(full), strict=False) if gains else ()

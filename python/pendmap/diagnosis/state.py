@@ -261,8 +261,10 @@ class State:
         """Return the increase of a model's sum of squares by each held-out set."""
         if fitted not in self._losses:
             held = self.hold_out(fitted)
-            lost = held and hold_out_losses(self.data, fitted, held, self.level)
-            self._losses[fitted] = lost or (math.inf,)
+            losses: tuple[float, ...] = (math.inf,)
+            if held is not None:
+                losses = hold_out_losses(self.data, fitted, held, self.level)
+            self._losses[fitted] = losses
         return self._losses[fitted]
 
     def scored(self, fitted: FittedModel) -> ScoredModel:
