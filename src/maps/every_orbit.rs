@@ -20,9 +20,9 @@ use crate::model::pendulum::{Route, Symmetry};
 use crate::orbit::PoincareMap;
 use crate::orbit::newton::{self, PeriodicOrbit};
 
-/// Lengths of steps for displacements and for orbits, in units of the fastest small oscillation: errors of 1e-6 and 1e-10 in a
+/// Lengths of steps for displacements and for orbits, in units of the fastest small oscillation: errors of 1e-5 and 1e-10 in a
 /// few periods.
-const STEPS: [f64; 2] = [0.2, 0.06];
+const STEPS: [f64; 2] = [0.3, 0.06];
 /// Cells along a turn, a period.
 const CELLS: usize = 60;
 /// Starts of Newton's method at most, a period.
