@@ -27,7 +27,7 @@ Types = Counter[tuple[str, int, int]]
 Points = tuple[dict[str, float], Types]
 
 
-def by_basins(model: dict[str, float], asked: argparse.Namespace) -> Iterator[Points]:
+def by_basins(model: dict[str, Any], asked: argparse.Namespace) -> Iterator[Points]:
     """Yield random points and the attractors that starts on a grid lead to."""
     random = np.random.default_rng(asked.seed)
     for _ in range(asked.count):
@@ -37,7 +37,7 @@ def by_basins(model: dict[str, float], asked: argparse.Namespace) -> Iterator[Po
         yield at, Counter((k.replace(" ", "_"), n, w) for k, n, w in zip(*columns, strict=True))
 
 
-def by_map(model: dict[str, float], asked: argparse.Namespace) -> Iterator[Points]:
+def by_map(model: dict[str, Any], asked: argparse.Namespace) -> Iterator[Points]:
     """Yield the cells of a map at random values of both parameters, and their attractors."""
     random = np.random.default_rng(asked.seed)
     counts = {"p": asked.count // ROWS, "omega": ROWS}
@@ -74,7 +74,7 @@ def main() -> None:
     parser.add_argument("--torque", type=float, default=0.0)
     parser.add_argument("--theta-r", type=float, default=0.0)
     asked = parser.parse_args()
-    model = {"gamma": asked.gamma, "torque": asked.torque, "theta_r": asked.theta_r}
+    model: dict[str, Any] = {"gamma": asked.gamma, "torque": asked.torque, "theta_r": asked.theta_r}
     plane: Any = pendmap.continuation(pendmap.Pendulum(**model), OVER, up_to=asked.up_to, threads=1)
     held = {"rest", "inverted_rest"} if asked.theta_r else set()
     points = missing = many = beyond = 0
