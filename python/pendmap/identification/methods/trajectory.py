@@ -263,9 +263,9 @@ def physical(joint: JointFit) -> JointFit:
     """Return a fit whose damping and sizes of effects do not drive the motion.
 
     What opposes the motion and is estimated below 0 is held at 0, and the others are fitted again.
-    Where no such fit is found, the fit is returned as it is.
+    Where the search did not converge, or no such fit is found, the fit is returned as it is.
     """
-    while name := joint.fit.negative:
+    while joint.fit.converged and (name := joint.fit.negative):
         known = {**joint.negative, name: joint.fit.estimates[name]}
         given = joint.given
         try:
