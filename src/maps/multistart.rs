@@ -145,7 +145,7 @@ fn judged(
     // Values that are not numbers give none.
     let [first, last] = [(from[0] / TAU).ceil() as i64, (from[1] / TAU).floor() as i64];
     let clear = !(to[0] <= 0.0 && to[1] >= 0.0);
-    let turns = if clear { 1..=0 } else { first.max(least)..=last.min(most) };
+    let turns = first.max(least)..=if clear { i64::MIN } else { last.min(most) };
     let linear = (!turns.is_empty()).then(|| Linear::of(patch)).flatten();
     let centre = [0, 1].map(|k| corner[k] + 0.5 * size[k]);
     turns.filter_map(move |turns| {
