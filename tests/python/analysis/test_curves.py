@@ -128,12 +128,11 @@ def test_a_curve_goes_on_where_slips_change_elsewhere_on_its_orbit() -> None:
 
 
 def test_an_oscillation_begins_where_friction_ceases_to_hold_the_pendulum() -> None:
-    pendulum = pendmap.Pendulum(gamma=0.1, theta_r=0.2, torque=0.1)
-    plane = pendmap.continuation(
-        pendulum, {"p": (1.8, 2.4), "omega": (1.9, 2.1)}, up_to=1, threads=1
-    )
+    pendulum = pendmap.Pendulum(gamma=0.1, theta_r=0.1, torque=0.2)
+    ranges = {"p": (0.4, 0.6), "omega": (1.9, 2.1)}
+    plane = pendmap.continuation(pendulum, ranges, up_to=1, threads=1)
     # Rest at the angle of least load is held while p torque < theta_r.
-    for p, stable in ((1.99, 0), (2.01, 1)):
+    for p, stable in ((0.49, 0), (0.51, 1)):
         orbits = continuation.stable_orbits(plane, {"p": p, "omega": 2.0})
         assert sum(one["stable"] for one in orbits if one["kind"] == "oscillation") == stable
     assert (plane.region_stable.values >= 0).all()
