@@ -96,7 +96,7 @@ impl Equation<f64> {
         forth.max(back)
     }
 
-    /// The same in the sense 1 and in the sense -1.
+    /// The greatest excess of the load at rest at `theta` over the friction, in the sense 1 and in the sense -1.
     #[must_use]
     pub fn greatest_excesses(&self, theta: f64) -> [f64; 2] {
         if self.has_closed_release() {
