@@ -69,9 +69,12 @@ impl Cycles<'_> {
     /// Whether slips between sticks are ones of rounding.
     pub(super) fn fades(&self, orbit: &Orbit) -> bool {
         let along = orbit.place[orbit.place.len() - 1];
-        let least = |equation: &_, theta, width| Some(least_loaded(equation, theta, width));
+        // Beside the angle of equal loads rest may be held on one side of it: the orbit has left that.
+        let nearest = |equation: &_, theta, width| {
+            balanced(equation, theta, width).or_else(|| Some(least_loaded(equation, theta, width)))
+        };
         orbit.phases.contains(&Phase::Stick)
-            && self.excess(orbit, along, least).is_some_and(|(_, excess)| excess < FAINT)
+            && self.excess(orbit, along, nearest).is_some_and(|(_, excess)| excess < FAINT)
     }
 
     /// The angle that is asked for beside an orbit that rests at the section, and the greatest excess of the load over the
