@@ -113,8 +113,15 @@ impl Cycles<'_> {
     }
 }
 
-/// Adds two orbits between which the phases change, and what happens there.
+/// Adds two orbits between which the phases change, and what happens there. A change that is undone at once is one of
+/// rounding.
 pub(super) fn crossed(cycles: &Cycles<'_>, run: &mut Run, before: &Orbit, after: Orbit) {
+    if let Some(first) = undone(run, &after) {
+        run.events.retain(|event| event.orbit < first);
+        run.orbits.truncate(first + 1);
+        run.orbits.push(after);
+        return;
+    }
     let orbit = run.orbits.len() - 1;
     let mut kinds: Vec<Kind> = kind(&before.phases, &after.phases).into_iter().collect();
     let last = before.tangent.len() - 1;
@@ -128,6 +135,15 @@ pub(super) fn crossed(cycles: &Cycles<'_>, run: &mut Run, before: &Orbit, after:
     let event = |kind| Event { kind, orbit, rises, supercritical: None, smooth: false };
     run.events.extend(kinds.into_iter().map(event));
     run.orbits.push(after);
+}
+
+/// The orbit before the last change of phases, if the branch is back there in the same sense.
+fn undone(run: &Run, after: &Orbit) -> Option<usize> {
+    let Event { orbit, smooth: false, .. } = *run.events.last()? else { return None };
+    let (before, last) = (&run.orbits[orbit], after.tangent.len() - 1);
+    let near = (&after.place - &before.place).norm() < NEIGHBOURS;
+    let onward = before.tangent[last] * after.tangent[last] > 0.0;
+    (near && onward && before.is_like(after)).then_some(orbit)
 }
 
 /// Marks the last orbit of a run as one beyond which friction holds the pendulum for ever.
