@@ -118,6 +118,17 @@ pub enum Error {
         /// The smallest error reached.
         reached: f64,
     },
+    /// No number of steps is enough for a search of orbits.
+    #[error(
+        "motions must be known to {needed:e} after five periods where orbits are searched, got {reached:.1e} by the \
+         best number of steps: the drive is too strong or too slow"
+    )]
+    Unresolved {
+        /// The error that is needed.
+        needed: f64,
+        /// The smallest error reached.
+        reached: f64,
+    },
     /// More memory than is free.
     #[error("{}", of_memory(what, *count, *needed, *free))]
     Memory {

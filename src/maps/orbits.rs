@@ -206,7 +206,12 @@ fn beginnings(
 ) -> Result<Vec<State>, Error> {
     let starts = Starts::Grid { theta: request.theta, velocity: request.velocity };
     let sample = starts.sampled_states(ERROR_SAMPLE, 0);
-    let (strobe, _) = accuracy::choose(pendulum, &sample, TOLERANCE, InstructionSet::choose()?)?;
+    let simd = InstructionSet::choose()?;
+    let (strobe, _) =
+        accuracy::choose(pendulum, &sample, TOLERANCE, simd).map_err(|error| match error {
+            Error::Tolerance { tol, reached } => Error::Unresolved { needed: tol, reached },
+            other => other,
+        })?;
     // The displacement is the total one, of which the turns are net.
     let displacements = |from: &[State]| -> Result<Vec<State>, Error> {
         let (ends, turns) = advance(&strobe, from, request.n, request.threads, control)?;
