@@ -170,15 +170,15 @@ class Motion:
         return len(joined) - joined.count("0"), joined.count("0")
 
     def excess(self, theta: float) -> float:
-        """Return the load over the friction at its greatest, where that is least."""
-        low, high = 1 - self.p, 1 + self.p
+        """Return the load over the friction at its greatest, where it is equal in both senses."""
 
-        def worst(x: float) -> float:
-            return max(abs(self.torque - part * math.sin(x)) for part in (low, high))
+        def loads(x: float) -> list[float]:
+            return [self.torque - part * math.sin(x) for part in (1 - self.p, 1 + self.p)]
 
-        ends = (theta - FAR, theta + FAR)
-        least = minimize_scalar(worst, bounds=ends, method="bounded", options={"xatol": 1e-12})
-        return float(least.fun) - self.friction
+        angle = brentq(
+            lambda x: max(loads(x)) + min(loads(x)), theta - FAR, theta + FAR, xtol=1e-14
+        )
+        return max(loads(angle)) - self.friction
 
 
 def around(data: xr.Dataset, event: dict[str, Any]) -> tuple[Floats, Floats, int]:
@@ -280,6 +280,8 @@ def on_curves(draw: np.random.Generator, k: int) -> Iterator[tuple[str, bool, st
     for name, (low, high) in ranges.items():
         at = plane[f"place_{name}"].values
         fit.append((low + AROUND < at) & (at < high - AROUND))
+        # Beside a kink another change is too near.
+        fit.append(np.abs(np.diff(at, prepend=np.inf)) > AROUND)
     places = np.flatnonzero(np.all(fit, axis=0))
     for place in draw.permutation(places)[:3]:
         for name in over:

@@ -5,6 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use super::find::REACH;
 use crate::integrate::{State, Strobe};
 use crate::model::{Angle, Equation, Pendulum};
+use crate::orbit::brackets::zero;
 use crate::orbit::{PoincareMap, newton};
 
 /// Number of angles at which a set without closed form is sought.
@@ -52,12 +53,36 @@ pub fn centres(pendulum: &Pendulum) -> Vec<f64> {
     all
 }
 
-/// The angles, hanging and upside down, where the load at its greatest is least: where rest is, or
-/// the oscillation that a drive makes of it.
+/// The angles, hanging and upside down, where the loads at their greatest in both senses exceed the friction alike: where
+/// rest is, or the oscillation that a drive makes of it.
 #[must_use]
 pub fn balances(pendulum: &Pendulum) -> [f64; 2] {
     let equation = pendulum.equation();
-    [0.0, PI].map(|middle| centre(&equation, middle))
+    if equation.is_plain() {
+        // The load torque - (1 + p cos) sin th swings about 0.
+        let theta = equation.torque.clamp(-1.0, 1.0).asin();
+        return [theta, PI - theta];
+    }
+    [0.0, PI].map(|middle| {
+        let half = 0.5 * PI / ANGLES as f64;
+        let angles = (0..ANGLES).map(|k| middle - FRAC_PI_2 + half * (2 * k + 1) as f64);
+        let all = angles.filter_map(|angle| balanced(&equation, angle, half));
+        let nearest = all.min_by(|a, b| (a - middle).abs().total_cmp(&(b - middle).abs()));
+        let theta = nearest.unwrap_or_else(|| centre(&equation, middle));
+        if (theta - middle).abs() < NEAR { middle } else { theta }
+    })
+}
+
+/// The angle within `width` of `theta` at which the loads at their greatest in both senses exceed the friction alike, by
+/// bisection.
+#[must_use]
+pub fn balanced(equation: &Equation<f64>, theta: f64, width: f64) -> Option<f64> {
+    let difference = |theta: f64| {
+        let [forth, back] = equation.greatest_excesses(theta);
+        forth - back
+    };
+    let [low, high] = [theta - width, theta + width];
+    (difference(low) * difference(high) <= 0.0).then(|| zero(difference, low, high))
 }
 
 /// Points of the orbits 1:0 that lie where the pendulum may stand still, stable or not: no trap of another attractor
@@ -98,8 +123,10 @@ fn equilibria(equation: &Equation<f64>) -> Vec<f64> {
 
 fn centre(equation: &Equation<f64>, middle: f64) -> f64 {
     if equation.is_plain() {
-        // The load torque - (1 + p cos) sin th is least in magnitude near torque = sin th.
-        let theta = equation.torque.clamp(-1.0, 1.0).asin();
+        // The greater of |torque - (1 + p) sin th| and |torque - (1 - p) sin th| is least where both are equal: at
+        // torque = sin th, or at sin th = 0 if p is above 1.
+        let level = if equation.motion.p.abs() > 1.0 { 0.0 } else { equation.torque };
+        let theta = level.clamp(-1.0, 1.0).asin();
         return if middle == 0.0 { theta } else { PI - theta };
     }
     let angle = |k: usize| middle - FRAC_PI_2 + PI * (k as f64 + 0.5) / ANGLES as f64;

@@ -8,7 +8,7 @@
 
 use nalgebra::DVector;
 
-use super::cycle::{Cycles, Orbit};
+use super::cycle::{Closure, Cycles, Orbit};
 use super::event::{self, Event};
 use super::transition;
 use crate::error::{Error, unless_cancelled};
@@ -239,7 +239,7 @@ impl Cycles<'_> {
             *refused = None;
             return Step::Long(CHANGE[0]);
         };
-        if next.norm > PARTED {
+        if next.norm > PARTED && self.of.closure != Closure::Rest {
             return Step::Over(End::Lost(next.norm), None);
         }
         let turn = here.tangent.dot(&next.tangent).clamp(-1.0, 1.0).acos();

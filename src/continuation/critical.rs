@@ -9,7 +9,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
-use super::cycle::{Closure, Cycles, Orbit, System, bordered};
+use super::cycle::{Closure, Cycles, FARTHEST, Orbit, System, bordered};
 use super::event::Kind;
 use super::period::{Image, Period};
 use crate::attractor::rest::balances;
@@ -270,7 +270,7 @@ impl Critical<'_> {
     ) -> Option<Point> {
         let steps = self.steps(guess);
         let mut place = guess.clone();
-        let mut before = f64::INFINITY;
+        let mut before = FARTHEST;
         let mut kept = border.cloned();
         let far = usize::from(border.is_none());
         for _ in 0..ITERATIONS[far] {

@@ -184,6 +184,11 @@ impl Critical<'_> {
         };
         let alike = next.orbit.phases == here.orbit.phases && next.orbit.stuck == here.orbit.stuck;
         if !alike && self.kind != Kind::RestBoundary {
+            // The curve has a kink there, and goes on if the shortest step leads to it.
+            if !next.orbit.stuck && length * CHANGE[0] < SHORTEST && next.orbit.moved < length {
+                next.coefficient = self.coefficient(&next, false);
+                return Ok((next, CHANGE[1]));
+            }
             *refused = Some(if next.orbit.stuck { End::Sticks } else { End::Phases });
             return Err(CHANGE[0]);
         }

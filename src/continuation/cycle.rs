@@ -32,6 +32,8 @@ use crate::orbit::floquet::multipliers;
 /// Newton's steps at most, and the part of the step before that a step may have.
 const ITERATIONS: usize = 8;
 const CONTRACTION: f64 = 0.3;
+/// The step that the first one contracts from: a long one leads to motions far beyond the branch.
+pub(super) const FARTHEST: f64 = 10.0;
 /// A gap of this many units of rounding is none.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 /// Within this many times as much steps that do not shrink are those of rounding.
@@ -239,7 +241,7 @@ impl Cycles<'_> {
             return self.complete(guess.clone(), &system, row, 0.0);
         }
         let mut place = guess.clone();
-        let mut before = f64::INFINITY;
+        let mut before = FARTHEST;
         for _ in 0..ITERATIONS {
             let system = self.system(&place, steps)?;
             let size = place.amax().max(1.0);

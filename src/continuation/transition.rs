@@ -9,8 +9,9 @@ use super::branch::Run;
 use super::cycle::{Cycles, Orbit};
 use super::event::{Event, Kind};
 use super::phases::Phase;
-use crate::attractor::rest::least_loaded;
+use crate::attractor::rest::{balanced, least_loaded};
 use crate::integrate::State;
+use crate::model::Equation;
 
 /// Halvings at most, the distance of the orbits at which they end, and the largest at which they are neighbours.
 const HALVINGS: usize = 60;
@@ -47,19 +48,19 @@ impl Cycles<'_> {
     }
 
     /// The orbit at which friction comes to hold the pendulum for ever, ahead of one beside it: the slips between its sticks
-    /// have faded, and the least load of all angles, at its greatest in a period, equals the friction.
+    /// have faded, and where the loads in both senses are equal at their greatest in a period they equal the friction.
     pub(super) fn swallowed(&self, here: &Orbit) -> Option<Orbit> {
         let last = here.place.len() - 1;
         let (mut before, sense) = (here.place[last], here.tangent[last].signum());
-        self.least_excess(here, before)?;
-        let holds = |along: f64| self.least_excess(here, along).is_some_and(|(_, x)| x <= 0.0);
+        self.excess(here, before, balanced)?;
+        let holds = |along: f64| self.excess(here, along, balanced).is_some_and(|(_, x)| x <= 0.0);
         let away = BEYOND.into_iter().find(|away| holds(before + sense * away))?;
         let mut beyond = before + sense * away;
         for _ in 0..HALVINGS {
             let middle = 0.5 * (before + beyond);
             if holds(middle) { beyond = middle } else { before = middle }
         }
-        let (theta, _) = self.least_excess(here, beyond)?;
+        let (theta, _) = self.excess(here, beyond, balanced)?;
         let points = vec![[theta, 0.0]; self.count()];
         let orbit = self.unfollowed(&self.place(&points, self.origin + beyond * self.scale))?;
         Some(Orbit { tangent: here.tangent.clone(), orientation: here.orientation, ..orbit })
@@ -68,13 +69,22 @@ impl Cycles<'_> {
     /// Whether slips between sticks are ones of rounding.
     pub(super) fn fades(&self, orbit: &Orbit) -> bool {
         let along = orbit.place[orbit.place.len() - 1];
+        // Beside the angle of equal loads rest may be held on one side of it: the orbit has left that.
+        let nearest = |equation: &_, theta, width| {
+            balanced(equation, theta, width).or_else(|| Some(least_loaded(equation, theta, width)))
+        };
         orbit.phases.contains(&Phase::Stick)
-            && self.least_excess(orbit, along).is_some_and(|(_, excess)| excess < FAINT)
+            && self.excess(orbit, along, nearest).is_some_and(|(_, excess)| excess < FAINT)
     }
 
-    /// The angle beside an orbit that rests at the section, and the excess of the load over the friction there at its
-    /// greatest, where that is least.
-    fn least_excess(&self, orbit: &Orbit, along: f64) -> Option<(f64, f64)> {
+    /// The angle that is asked for beside an orbit that rests at the section, and the greatest excess of the load over the
+    /// friction there.
+    fn excess(
+        &self,
+        orbit: &Orbit,
+        along: f64,
+        angle: impl Fn(&Equation<f64>, f64, f64) -> Option<f64>,
+    ) -> Option<(f64, f64)> {
         let points = self.points(&orbit.place);
         let theta = points[0][0];
         let still = |point: &State| (point[0] - theta).abs().max(point[1].abs()) < FADED;
@@ -82,8 +92,8 @@ impl Cycles<'_> {
             return None;
         }
         let equation = self.course.pendulum(&[self.origin + along * self.scale]).equation();
-        let least = least_loaded(&equation, theta, FADED);
-        Some((least, equation.excess(least)))
+        let theta = angle(&equation, theta, FADED)?;
+        Some((theta, equation.excess(theta)))
     }
 
     /// The first orbit with other phases where no orbit lies ahead of the last one: the branch turns back.

@@ -7,7 +7,8 @@ use crate::integrate::State;
 /// Least number of trusted samples of a window that determines parameters.
 const FEWEST: usize = 8;
 /// The initial state comes from a cubic through the readings within this time on either side; at an
-/// end of the record, where a cubic's slope is uncertain, from a parabola over twice the time.
+/// end of the record, where a cubic's slope is uncertain, from a parabola over twice the time. Where readings are so sparse that
+/// [`FEWEST`] take more than twice that, as many as determine the polynomial: a motion turns too much within a longer time.
 const REACH: f64 = 0.5;
 
 /// A stretch of a record, from sample `from` to before sample `to`.
@@ -85,7 +86,8 @@ pub fn guess(record: &Record, at: usize) -> State {
         let from = record.times.partition_point(|time| *time < now - reach);
         let to = record.times.partition_point(|time| *time <= now + reach);
         let whole = from == 0 && to == record.times.len();
-        if trusted(record, from, to) >= FEWEST || whole {
+        let enough = if reach > 2.0 * REACH { degree + 1 } else { FEWEST };
+        if trusted(record, from, to) >= enough || whole {
             return polynomial(record, from, to, now, degree);
         }
         reach *= 2.0;
@@ -98,7 +100,7 @@ fn trusted(record: &Record, from: usize, to: usize) -> usize {
 
 /// Value and slope at `now` of the polynomial through the trusted readings; a line through few.
 fn polynomial(record: &Record, from: usize, to: usize, now: f64, degree: usize) -> State {
-    let count = if trusted(record, from, to) >= FEWEST { degree + 1 } else { 2 };
+    let count = if trusted(record, from, to) > degree { degree + 1 } else { 2 };
     let mut normal = nalgebra::DMatrix::<f64>::zeros(count, count);
     let mut right = nalgebra::DVector::<f64>::zeros(count);
     for k in (from..to).filter(|k| record.weights[*k] > 0.0) {

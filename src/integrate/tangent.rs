@@ -2,7 +2,7 @@
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use crate::lanes::sine::Degree;
+use crate::lanes::sine::{Degree, both};
 use crate::lanes::{Lane, MAX_WIDTH, Real, Work, each};
 
 /// Least root by which a derivative is divided: at 0 it is steep, but finite.
@@ -106,9 +106,10 @@ impl<L: Lane, const N: usize> Real for Tangent<L, N> {
     #[inline(always)]
     fn sine<D: Degree>(mut self) -> Self {
         // d sin(pi x) = pi cos(pi x) dx.
-        let slope_of_sine = self.value.cosine::<D>().scale(std::f64::consts::PI);
+        let (sine, cosine) = both::<D, L>(self.value);
+        let slope_of_sine = cosine.scale(std::f64::consts::PI);
         each!(i in N => self.slope[i] = self.slope[i] * slope_of_sine);
-        self.value = self.value.sine::<D>();
+        self.value = sine;
         self
     }
 

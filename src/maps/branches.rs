@@ -6,7 +6,7 @@
 
 use super::control::Control;
 use super::every_orbit::{ANY_TURNS, of_types};
-use super::orbits::LONGEST;
+use super::orbits::{LONGEST, MOST_CELLS};
 use crate::continuation::branch::Bounds;
 use crate::continuation::course::Course;
 use crate::continuation::family::Family;
@@ -139,7 +139,7 @@ fn orbits(
         Sought::Near(_) => Vec::new(),
     };
     let mirrored = symmetry == Some(Symmetry::AtOnce) && types.iter().all(|(_, [a, b])| *a == -b);
-    let mut all = of_types(pendulum, &types, mirrored, request.threads, control)?;
+    let mut all = of_types(pendulum, &types, mirrored, MOST_CELLS, request.threads, control)?;
     // Where nothing drives the pendulum, orbits close after a given time only by coincidence.
     let rests = |orbit: &PeriodicOrbit| orbit.points[0][1].abs() < SAME;
     all.retain(|orbit| {

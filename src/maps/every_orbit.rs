@@ -20,14 +20,14 @@ use crate::model::pendulum::{Route, Symmetry};
 use crate::orbit::PoincareMap;
 use crate::orbit::newton::{self, PeriodicOrbit};
 
-/// Lengths of steps for displacements and for orbits, in units of the fastest small oscillation: errors of 1e-6 and 1e-10 in a
+/// Lengths of steps for displacements and for orbits, in units of the fastest small oscillation: errors of 1e-5 and 1e-10 in a
 /// few periods.
-const STEPS: [f64; 2] = [0.2, 0.06];
+const STEPS: [f64; 2] = [0.3, 0.06];
 /// Cells along a turn, a period: where several types are searched, and for one, of which this many periods count.
 const CELLS: usize = 60;
 const FINE: usize = 200;
 const FINER: usize = 4;
-/// Starts of Newton's method at most, a period.
+/// Starts of Newton's method at most, a period, where many searches are made.
 const MOST: usize = 4_000;
 /// Its largest distance from a start, in cells, and the least value of that distance.
 const REACH: f64 = 8.0;
@@ -49,11 +49,11 @@ pub fn every_orbit(
 ) -> Result<Vec<PeriodicOrbit>, Error> {
     let mirrored = pendulum.symmetry() == Some(Symmetry::AtOnce);
     let types: Vec<_> = (1..=longest).map(|n| (n, ANY_TURNS)).collect();
-    of_types(pendulum, &types, mirrored, threads, control)
+    of_types(pendulum, &types, mirrored, MOST, threads, control)
 }
 
-/// Orbits with these periods and net turns, from the least to the most; if `mirrored`, of mirror images one, that
-/// turns forward.
+/// Orbits with these periods and net turns, from the least to the most, by Newton's method from at most so many starts a
+/// period; if `mirrored`, of mirror images one, that turns forward.
 ///
 /// # Errors
 /// The errors of [`super::orbits::orbits`].
@@ -61,6 +61,7 @@ pub(super) fn of_types(
     pendulum: &Pendulum,
     types: &[(usize, [i64; 2])],
     mirrored: bool,
+    most: usize,
     threads: usize,
     control: &Control,
 ) -> Result<Vec<PeriodicOrbit>, Error> {
@@ -92,8 +93,8 @@ pub(super) fn of_types(
             Ok(from.iter().zip(ends.iter().zip(turns)).map(gap).collect())
         };
         let axes = grid(n)?;
-        let mut places = places(axes, turns, MOST, &displacement)?;
-        places.truncate(MOST);
+        let mut places = places(axes, turns, most, &displacement)?;
+        places.truncate(most);
         let cell = TAU / axes[0].count as f64;
         let far = LEAST_REACH.max(REACH * cell);
         let near = approach(&places, far, displacement)?;

@@ -8,7 +8,7 @@
 //!
 //! [`approach`] then takes steps of Newton's method by finite differences from many places at once.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::f64::consts::TAU;
 
 use nalgebra::{Matrix2, Vector2};
@@ -40,11 +40,14 @@ const SAME: f64 = 1e-5;
 /// The nodes of a cell and its ring, rows of equal velocity, the lowest first.
 type Patch = [State; 16];
 
+/// A node, by its numbers along both axes in the finest division.
+type Place = [i64; 2];
+
 /// A cell that may hold a zero.
 #[derive(Clone, Copy, Debug)]
 struct Cell {
     /// Its corner with the lowest values.
-    corner: State,
+    place: Place,
     /// The zero of the linear part.
     aim: State,
     /// The turns that the field has there.
@@ -80,35 +83,41 @@ pub(super) fn places(
         for i in 0..theta.count {
             let patch = |k: usize| values[(j + k / 4) * columns + i + k % 4];
             let corner = nodes[(j + 1) * columns + i + 1];
-            cells.extend(judged(corner, size, turns, &std::array::from_fn(patch)));
+            let place = [i, j].map(|k| (k << LEVELS) as i64);
+            cells.extend(judged((place, corner), size, turns, &std::array::from_fn(patch)));
         }
     }
-    for _ in 0..LEVELS {
+    let finest = size.map(|s| s / f64::from(1 << LEVELS));
+    let at =
+        |[i, j]: Place| [theta.low + i as f64 * finest[0], velocity.low + j as f64 * finest[1]];
+    let mut known: HashMap<Place, State> = HashMap::new();
+    for level in 1..=LEVELS {
         if cells.len() > most {
             break;
         }
-        let half = size.map(|s| 0.5 * s);
+        let side = 1 << (LEVELS - level);
+        size = size.map(|s| 0.5 * s);
         let around = |cell: &Cell| {
-            let [x, y] = cell.corner;
-            (0..25).map(move |k| {
-                let (i, j) = (f64::from(k % 5) - 1.0, f64::from(k / 5) - 1.0);
-                [x + i * half[0], y + j * half[1]]
-            })
+            let [i, j] = cell.place;
+            (-1..=3).flat_map(move |y| (-1..=3).map(move |x| [i + x * side, j + y * side]))
         };
-        let nodes: Vec<State> = cells.iter().flat_map(around).collect();
-        let values = field(&nodes)?;
+        let mut new: Vec<Place> = cells.iter().flat_map(around).collect();
+        new.sort_unstable();
+        new.dedup();
+        new.retain(|place| !known.contains_key(place));
+        let values = field(&new.iter().map(|place| at(*place)).collect::<Vec<State>>())?;
+        known.extend(new.into_iter().zip(values));
         let mut smaller = Vec::new();
-        let parts = nodes.chunks_exact(25).zip(values.chunks_exact(25));
-        for (cell, (nodes, values)) in cells.iter().zip(parts) {
+        for cell in &cells {
+            let values: Vec<State> = around(cell).map(|place| known[&place]).collect();
             for quarter in 0..4 {
                 let (i, j) = (quarter % 2, quarter / 2);
-                let patch = |k: usize| values[(j + k / 4) * 5 + i + k % 4];
-                let corner = nodes[(j + 1) * 5 + i + 1];
-                let turns = [cell.turns; 2];
-                smaller.extend(judged(corner, half, turns, &std::array::from_fn(patch)));
+                let patch = std::array::from_fn(|k| values[(j + k / 4) * 5 + i + k % 4]);
+                let place = [cell.place[0] + i as i64 * side, cell.place[1] + j as i64 * side];
+                smaller.extend(judged((place, at(place)), size, [cell.turns; 2], &patch));
             }
         }
-        (cells, size) = (smaller, half);
+        cells = smaller;
     }
     if cells.len() > most {
         cells.sort_by(|a, b| a.bend.total_cmp(&b.bend));
@@ -118,65 +127,68 @@ pub(super) fn places(
 
 /// The cell with each number of turns, from the least to the most, that the field may have in it.
 fn judged(
-    corner: State,
+    (place, corner): (Place, State),
     size: [f64; 2],
     [least, most]: [i64; 2],
     patch: &Patch,
 ) -> impl Iterator<Item = Cell> {
-    let [mut low, mut high] = [f64::INFINITY, f64::NEG_INFINITY];
-    for [first, _] in patch {
-        (low, high) = (low.min(*first), high.max(*first));
+    let [mut low, mut high] = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
+    for value in patch {
+        for k in 0..2 {
+            (low[k], high[k]) = (low[k].min(value[k]), high[k].max(value[k]));
+        }
     }
-    let spare = CLEAR * (high - low);
-    // A value that is not a number gives none.
-    let [from, to] = [((low - spare) / TAU).ceil() as i64, ((high + spare) / TAU).floor() as i64];
-    let shifted = move |turns: i64| patch.map(|[a, b]| [a - TAU * turns as f64, b]);
-    (from.max(least)..=to.min(most)).filter_map(move |turns| {
-        let (aim, bend) = judge(corner, size, &shifted(turns))?;
-        Some(Cell { corner, aim, turns, bend })
+    let [from, to] = [0, 1].map(|k| {
+        let spare = CLEAR * (high[k] - low[k]);
+        [low[k] - spare, high[k] + spare]
+    });
+    // Values that are not numbers give none.
+    let [first, last] = [(from[0] / TAU).ceil() as i64, (from[1] / TAU).floor() as i64];
+    let clear = !(to[0] <= 0.0 && to[1] >= 0.0);
+    let turns = first.max(least)..=if clear { i64::MIN } else { last.min(most) };
+    let linear = (!turns.is_empty()).then(|| Linear::of(patch)).flatten();
+    let centre = [0, 1].map(|k| corner[k] + 0.5 * size[k]);
+    turns.filter_map(move |turns| {
+        let unresolved = Cell { place, aim: centre, turns, bend: f64::INFINITY };
+        let Some(Linear { inverse, mean, bend }) = linear else { return Some(unresolved) };
+        let from_centre = inverse * (mean - Vector2::new(TAU * turns as f64, 0.0));
+        if (0..2).any(|k| from_centre[k].abs() > HALF + bend[k]) {
+            return None;
+        }
+        let bend = bend[0] + bend[1];
+        if !bend.is_finite() {
+            return Some(unresolved);
+        }
+        // At most to the cell's edge: the linear part is unknown beyond.
+        let aim = [0, 1].map(|k| centre[k] - from_centre[k].clamp(-1.0, 1.0) * size[k]);
+        Some(Cell { place, aim, turns, bend })
     })
 }
 
-/// The zero of the linear part and the nonlinear part, if the field may vanish in the cell.
-fn judge(corner: State, size: [f64; 2], patch: &Patch) -> Option<(State, f64)> {
-    let [mut low, mut high] = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
-    for value in patch.iter().flatten().zip([0, 1].into_iter().cycle()) {
-        let (value, k) = value;
-        low[k] = low[k].min(*value);
-        high[k] = high[k].max(*value);
-    }
-    for k in 0..2 {
-        let spare = CLEAR * (high[k] - low[k]);
-        // False too if a value is not a number.
-        if !(low[k] <= spare && high[k] >= -spare) {
-            return None;
+/// A field on a cell: the inverse of its derivative, in cells, its mean, and the nonlinear part on the ring, in cells.
+#[derive(Clone, Copy)]
+struct Linear {
+    inverse: Matrix2<f64>,
+    mean: Vector2<f64>,
+    bend: [f64; 2],
+}
+
+impl Linear {
+    /// None where the derivative has no inverse.
+    fn of(patch: &Patch) -> Option<Self> {
+        let value = |k: usize| Vector2::from(patch[k]);
+        let mean = 0.25 * (value(5) + value(6) + value(9) + value(10));
+        let along = 0.5 * (value(6) + value(10) - value(5) - value(9));
+        let up = 0.5 * (value(9) + value(10) - value(5) - value(6));
+        let inverse = Matrix2::from_columns(&[along, up]).try_inverse()?;
+        let mut bend = [0.0_f64; 2];
+        for k in 0..16 {
+            let at = Vector2::new((k % 4) as f64 - 1.5, (k / 4) as f64 - 1.5);
+            let rest = inverse * (value(k) - mean) - at;
+            bend = [bend[0].max(rest[0].abs()), bend[1].max(rest[1].abs())];
         }
+        Some(Self { inverse, mean, bend })
     }
-    let centre = [corner[0] + 0.5 * size[0], corner[1] + 0.5 * size[1]];
-    let value = |k: usize| Vector2::from(patch[k]);
-    let mean = 0.25 * (value(5) + value(6) + value(9) + value(10));
-    let along = 0.5 * (value(6) + value(10) - value(5) - value(9));
-    let up = 0.5 * (value(9) + value(10) - value(5) - value(6));
-    let unresolved = Some((centre, f64::INFINITY));
-    let Some(inverse) = Matrix2::from_columns(&[along, up]).try_inverse() else {
-        return unresolved;
-    };
-    let from_centre = inverse * mean;
-    let mut bent = [0.0_f64; 2];
-    for k in 0..16 {
-        let at = Vector2::new((k % 4) as f64 - 1.5, (k / 4) as f64 - 1.5);
-        let rest = inverse * value(k) - from_centre - at;
-        bent = [bent[0].max(rest[0].abs()), bent[1].max(rest[1].abs())];
-    }
-    if (0..2).any(|k| from_centre[k].abs() > HALF + bent[k]) {
-        return None;
-    }
-    let bend = bent[0] + bent[1];
-    if !bend.is_finite() {
-        return unresolved;
-    }
-    // At most to the cell's edge: the linear part is unknown beyond.
-    Some(([0, 1].map(|k| centre[k] - from_centre[k].clamp(-1.0, 1.0) * size[k]), bend))
 }
 
 /// A start during the iteration.

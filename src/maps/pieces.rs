@@ -13,6 +13,7 @@ use super::every_orbit::every_orbit;
 use crate::continuation::branch::{Bounds, interpolated};
 use crate::continuation::critical::{Critical, Point};
 use crate::continuation::cycle::{Closure, Type};
+use crate::continuation::event::Kind;
 use crate::continuation::family::Family;
 use crate::continuation::plane::{Curve, Plane};
 use crate::error::Error;
@@ -118,12 +119,8 @@ fn layers(
             layers.push(Layer::new(plane, of));
         }
     };
-    for curve in &plane.curves {
-        add(&mut layers, curve.of);
-        let shed = plane.critical(curve.of, curve.kind).cycles.shed_type(curve.kind);
-        if let Some(of) = shed {
-            add(&mut layers, of);
-        }
+    for of in plane.curves.iter().flat_map(|curve| types(plane, curve)) {
+        add(&mut layers, of);
     }
     let large = |(number, layer): (usize, &Layer)| {
         let large = layer.pieces.iter().filter(|piece| piece.points >= LEAST);
@@ -195,8 +192,9 @@ impl Layer {
     fn new(plane: &Plane, of: Type) -> Self {
         // Whether a point is joined to the next one to the right, and to the one above.
         let mut joined = [vec![true; SIDE * SIDE], vec![true; SIDE * SIDE]];
-        let curves: Vec<usize> =
-            (0..plane.curves.len()).filter(|k| borders(plane, &plane.curves[*k], of)).collect();
+        let curves: Vec<usize> = (0..plane.curves.len())
+            .filter(|k| types(plane, &plane.curves[*k]).any(|one| one.is_like(&of)))
+            .collect();
         for curve in &curves {
             for both in plane.curves[*curve].points.windows(2) {
                 divide(&mut joined, &both[0], &both[1]);
@@ -255,10 +253,14 @@ impl Layer {
     }
 }
 
-/// Whether the number of stable orbits of a type may change at a curve.
-fn borders(plane: &Plane, curve: &Curve, of: Type) -> bool {
+/// The types whose number of stable orbits may change at a curve: that of its orbits and that which it sheds. Where
+/// friction ceases to hold the pendulum, rest becomes an orbit of the drive's period.
+fn types(plane: &Plane, curve: &Curve) -> impl Iterator<Item = Type> {
     let shed = plane.critical(curve.of, curve.kind).cycles.shed_type(curve.kind);
-    curve.of.is_like(&of) || shed.is_some_and(|shed| shed.is_like(&of))
+    let symmetric = plane.symmetry == Some(Symmetry::HalfPeriod);
+    let closure = if symmetric { Closure::Half } else { Closure::Whole };
+    let begun = (curve.kind == Kind::RestBoundary).then_some(Type { closure, ..curve.of });
+    [Some(curve.of), shed, begun].into_iter().flatten()
 }
 
 /// Parts the neighbours between which a curve passes from one of its points to the next.

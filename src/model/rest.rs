@@ -92,17 +92,26 @@ impl Equation<f64> {
     /// period; negative where it never does.
     #[must_use]
     pub fn excess(&self, theta: f64) -> f64 {
+        let [forth, back] = self.greatest_excesses(theta);
+        forth.max(back)
+    }
+
+    /// The greatest excess of the load at rest at `theta` over the friction, in the sense 1 and in the sense -1.
+    #[must_use]
+    pub fn greatest_excesses(&self, theta: f64) -> [f64; 2] {
         if self.has_closed_release() {
             // The load is linear in the cosine.
-            let load = |c: f64| {
+            let [a, b] = [1.0, -1.0].map(|c| {
                 let forcing = self.at_rest(1.0 + self.motion.p * c);
-                self.load(&forcing, &self.point(&forcing, theta, 0.0, 1.0)).abs()
-            };
-            return load(1.0).max(load(-1.0)) - self.hold(theta);
+                self.load(&forcing, &self.point(&forcing, theta, 0.0, 1.0))
+            });
+            let hold = self.hold(theta);
+            return [a.max(b) - hold, -a.min(b) - hold];
         }
         let interval = self.time_scale() / SAMPLES as f64;
-        let at = |k: usize| greatest(self, interval * k as f64, theta).0;
-        (0..SAMPLES).map(at).fold(f64::NEG_INFINITY, f64::max)
+        let at = |k: usize| excesses(self, interval * k as f64, theta);
+        let greater = |a: [f64; 2], b: [f64; 2]| [a[0].max(b[0]), a[1].max(b[1])];
+        (0..SAMPLES).map(at).fold([f64::NEG_INFINITY; 2], greater)
     }
 }
 

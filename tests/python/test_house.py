@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "python" / "pendmap"
 MODULES = sorted(PACKAGE.rglob("*.py"))
 
-LINES = 40_446
+LINES = 40_445
 """Ratchet: lines of Python in python/pendmap, in thousands: a small addition changes no limit."""
 DIRECT = 370
 """Ratchet: format specifications of numbers outside formatting.py."""

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 _FINER = 8  # Points of a line for each that was computed
+_SURE = 0.2  # Distance, cells of the lattice, to which lines between computed points are exact
 
 
 def variables(raw: _core.BifurcationSet, axes: tuple[Varied, ...]) -> dict[str, Any]:
@@ -78,8 +79,8 @@ def stable_orbits(dataset: xr.Dataset, at: Mapping[str, float]) -> list[dict[str
     """Return the types of orbits of which some are stable at a point of the plane, and how many.
 
     The number is that of the nearest point of the lattice from which no curve at which it changes
-    parts the point; where there is none or its number is not known, that of a search at the point
-    itself. Outside the plane there are none.
+    parts the point or what is near it; where there is none or its number is not known, that of a
+    search at the point itself. Outside the plane there are none.
     """
     varied, stable = str(dataset.attrs["varied"]).split(", "), dataset["stable_count"].values
     low, high = np.array(dataset.attrs["low"]), np.array(dataset.attrs["high"])
@@ -92,12 +93,14 @@ def stable_orbits(dataset: xr.Dataset, at: Mapping[str, float]) -> list[dict[str
     places = np.stack([dataset[f"place_{name}"].values for name in varied], axis=-1)
     places, owner = (places - low) / (high - low) * side - 0.5, dataset["place_curve"].values
     lines = [places[owner == k] for k in range(dataset.sizes["curve"])]
-    lines = [smooth(line)[0] if len(line) > 1 else line for line in lines]
+    lines = [np.vstack([smooth(x)[0] if len(x) > 1 else x, (np.nan, np.nan)]) for x in lines]
+    around = here + _SURE * np.array([[1, 0], [0, 1], [-1, 0], [0, -1]])
     totals: dict[tuple[str, int, int], int] = {}
     doubtful = set()
     for number, of in enumerate(result.rows(dataset, "type_kind", "type_n", "type_w")):
         borders = dataset["border_curve"].values[dataset["border_type"].values == number]
-        free = [c for c in near if not any(_crosses(lines[k], here, c) for k in borders)]
+        line = np.vstack([near[:1], *(lines[k] for k in borders)])
+        free = [c for c in near if not any(_crosses(line, a, c) for a in around)]
         count = int(stable[number, int(free[0][1]), int(free[0][0])]) if free else -1
         totals[of] = totals.get(of, 0) + count
         doubtful |= {of} if count < 0 else set()

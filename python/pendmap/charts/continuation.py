@@ -65,9 +65,8 @@ def chart(dataset: xr.Dataset, *, layer: str | None = None, cells: int = 0) -> C
         panels = [Panel("curves", "", across, up, marks)]
         steps = np.linspace(a["low"][1], a["high"][1], _STEPS)
         moving = recorded(panels, _critical(dataset, both, steps), *sides)
-        title = (
-            f"Bifurcations of orbits up to {counted(a['up_to'], 'period')} over {names.over(both)}"
-        )
+        longest = counted(a["up_to"], "period")
+        title = f"Bifurcations of orbits up to {longest} over {names.over(both)}"
         look: dict[str, Any] = {"timeline": (both[1], steps), "size": (7.4, 5.6)}
         return Chart(title, names.parameters(a, both), [panels], recorded=moving, **look).only(
             layer
@@ -98,7 +97,10 @@ def recorded(
     panels: Sequence[Panel], moving: Mapping[str, list[Mark]], angle: Axis, speed: Axis
 ) -> list[Panel]:
     """Return panels with their marks that move, and the phase plane with its own."""
-    every = [*panels, Panel("phase", "Phase plane", angle, speed, [])]
+    paths = [mark.path for marks in moving.values() for mark in marks]
+    small = any(path.endswith("unstable") for path in paths)
+    known = [Line(NONE, NONE, name="small: unstable")] if small else []
+    every = [*panels, Panel("phase", "Phase plane", angle, speed, known)]
     return [replace(one, marks=[*one.marks, *moving.get(one.name, ())]) for one in every]
 
 
@@ -192,6 +194,8 @@ def lines(
                     name = f"{n}:{abs(w)}" if way + k == 0 else ""
                     look = {"colour": colours[n, abs(w)], "name": name, "width": 1.3 - 0.5 * way}
                 yield Line(x, line, dash=dash, path=f"branch/{number}/{way}/{k}", **look)
+    if colours and not dataset["orbit_stable"].values.all():
+        yield Line(NONE, NONE, dash=DASHED, width=0.8, name="thin: unstable")
 
 
 def events(dataset: xr.Dataset, which: str) -> Iterator[Mark]:
@@ -217,14 +221,8 @@ def _backbones(dataset: xr.Dataset) -> list[Mark]:
     if "backbone_value" not in dataset:
         return []
     n, swings = dataset["branch_n"].values[dataset["orbit_branch"].values], dataset["orbit_swings"]
-    types = sorted(
-        {
-            (a // g, b // g)
-            for a, b in zip(n, swings.values, strict=True)
-            if b
-            for g in [math.gcd(a, b)]
-        }
-    )
+    pairs = zip(n, swings.values, strict=True)
+    types = sorted({(a // math.gcd(a, b), b // math.gcd(a, b)) for a, b in pairs if b})
     rate, height = (dataset[f"backbone_{key}"].values for key in ("value", "amplitude"))
     look: dict[str, Any] = {"colour": QUIET, "dash": DOTTED}
     return [

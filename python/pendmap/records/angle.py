@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from pendmap.tables.findings import Finding
 
 WRAPPED_SPAN: Final = 1.01  # Greatest span of wrapped readings, turns: one turn and some noise
-WRAP_JUMP: Final = 0.75  # Least jump between neighbours that is a wrap, turns
+WRAP_JUMP: Final = 0.5  # Jump between neighbours above which the nearer angle is a turn away, turns
 LARGEST_ANGLE: Final = 1e5  # Greatest plausible angle, rad: about 16,000 turns
 MOST_HUGE: Final = 0.5  # Share of implausible angles above which the column is refused
 DRIFT_DEGREE: Final = 8  # Degree of the polynomials of time along which a camera drifts

@@ -64,7 +64,8 @@ class Drawing:
             if place.panel.warning:
                 yield from (f"**{plain(place.panel.warning)}**", "")
             names |= marks.legend(place.panel.marks)
-        yield from (f"- {plain(name)}: {palette.in_words(shade)}" for name, shade in names.items())
+        for name, shade in names.items():
+            yield f"- {plain(name)}" + f": {palette.in_words(shade)}" * (shade != charts.INK)
         yield from (f"\n{plain(note)}" for note in chart.notes)
 
 

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from pendmap.charts.marks import Ends, Floats, Mark
 
 SIDE: Final = 1000.0  # Width of a frame, units of the view
-SHORT: Final = 8  # Greatest number of letters of an axis name beside the ticks
 _POWER: Final = re.compile(r"\$(-?)10\^\{(-?\d+)\}\$")
 PALE: Final = (charts.INK, charts.QUIET)  # Colours that are invisible on a dark background
 AREAS, LINES, POINTS = 10.0, 20.0, 30.0  # Drawing order above images, the lowest first
@@ -154,8 +153,8 @@ class Place:
         thin = rr.LineStrips2D(lines, colors=[INK], radii=rr.Radius.ui_points(0.75))
         stream.log(f"{self.root}/axes/frame", thin, static=True)
         places = [[at, h + 20] for at, _ in columns] + [[-70, at - 22] for at, _ in rows]
-        # A long name does not fit beside the ticks.
-        places += [[w / 2, h + 75], [0, -85] if len(beside) > SHORT else [-135, h / 2 - 22]]
+        # Beside the ticks a name would cover one where the view is small.
+        places += [[w / 2, h + 75], [0, -85]]
         texts = [*(text for _, text in [*columns, *rows]), below, beside]
         stream.log(f"{self.root}/axes/ticks", recording.labels(places, texts), static=True)
 

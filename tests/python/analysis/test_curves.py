@@ -104,6 +104,40 @@ def test_a_doubling_reaches_the_curve_where_its_multiplier_begins_to_jump(
     assert len(set(jumps)) == 2
 
 
+def test_a_curve_goes_on_where_slips_change_elsewhere_on_its_orbit() -> None:
+    pendulum = pendmap.Pendulum(gamma=0.1, theta_r=0.05)
+    ranges = {"p": (1.45, 1.5), "omega": (1.2, 1.3)}
+    plane = pendmap.continuation(pendulum, ranges, up_to=2, threads=1)
+    ends = (plane[f"curve_{side}"].values for side in ("begin", "end"))
+    assert {str(end) for both in ends for end in both} == {"end of the range"}
+    places = [plane[f"place_{name}"].values for name in ("p", "omega", "curve")]
+    kink = np.flatnonzero(np.hypot(np.diff(places[0]), np.diff(places[1])) < 1e-7)[0]
+    p, omega = (place[places[2] == places[2][kink]] for place in places[:2])
+    assert plane["curve_kind"].values[places[2][kink]] == "stick_onset"
+    # A point beyond the kink is an onset along one parameter.
+    beyond = int(np.flatnonzero((omega > 1.22) & (omega < 1.29))[0])
+    alone = pendmap.continuation(
+        pendmap.Pendulum(gamma=0.1, theta_r=0.05, omega=float(omega[beyond])),
+        {"p": (float(p[beyond]) - 0.01, float(p[beyond]) + 0.01)},
+        n=2,
+        w=1,
+        threads=1,
+    )
+    onset = alone["event_value"].values[alone["event_kind"].values == "stick_onset"]
+    assert np.abs(onset - p[beyond]).min() < 1e-8
+
+
+def test_an_oscillation_begins_where_friction_ceases_to_hold_the_pendulum() -> None:
+    pendulum = pendmap.Pendulum(gamma=0.1, theta_r=0.1, torque=0.2)
+    ranges = {"p": (0.4, 0.6), "omega": (1.9, 2.1)}
+    plane = pendmap.continuation(pendulum, ranges, up_to=1, threads=1)
+    # Rest at the angle of least load is held while p torque < theta_r.
+    for p, stable in ((0.49, 0), (0.51, 1)):
+        orbits = continuation.stable_orbits(plane, {"p": p, "omega": 2.0})
+        assert sum(one["stable"] for one in orbits if one["kind"] == "oscillation") == stable
+    assert (plane.region_stable.values >= 0).all()
+
+
 def test_the_figure_names_changes_of_slips_and_sticks(rough: xr.Dataset) -> None:
     (panel,) = registry.build(registry.ready(rough)).panels
     shown = {mark.name for mark in panel.marks if isinstance(mark, Line)}

@@ -175,7 +175,7 @@ def test_bad_input_gets_one_line_and_leaves_nothing(
 # What is read
 
 TIME = np.arange(300) * 0.03
-SWING = 2 * np.exp(-0.05 * TIME) * np.cos(6 * TIME)
+SWING = 0.1 * np.exp(-0.05 * TIME) * np.cos(6 * TIME)
 
 
 def test_as_many_columns_as_are_allowed_are_read(tmp_path: Path) -> None:

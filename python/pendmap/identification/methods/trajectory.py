@@ -216,9 +216,8 @@ def fit_together(
 ) -> JointFit:
     """Fit natural frequency, damping, the sensor's zero error and effects to one or more runs.
 
-    The choices are those of :func:`fit_from_start`. Where the search does not converge, quadratic
-    drag is fitted too, unless effects or a model to start from are given; else runs are used from
-    where they leave the upright position, near which every error grows.
+    The choices are those of :func:`fit_from_start`. If the search does not converge, quadratic drag
+    is fitted too (given no effects and no model); then runs are cut to where they leave upright.
     """
     later = [_from_upright(run) for run in runs]
     fixed = effects or isinstance(start, Rig)
@@ -227,11 +226,12 @@ def fit_together(
         if used is later and all(run is cut for run, cut in zip(runs, later, strict=True)):
             break
         with contextlib.suppress(FitDiverged):
-            joint = physical(fit_trusted(used, start, [added] if added else effects))
+            free = fit_trusted(used, start, [added] if added else effects)
+            joint = physical(free) if free.fit.converged else free
             if joint.fit.converged and (not added or min(joint.fit.model.effects[0].values) > 0):
                 return dataclasses.replace(joint, added=added)
             first = first or joint
-    return first or fit_trusted(runs, start, effects)
+    return physical(first or fit_trusted(runs, start, effects))
 
 
 def _from_upright(run: Run) -> Run:
