@@ -8,7 +8,7 @@
 
 use nalgebra::DVector;
 
-use super::cycle::{Cycles, Orbit};
+use super::cycle::{Closure, Cycles, Orbit};
 use super::event::{self, Event};
 use super::transition;
 use crate::error::{Error, unless_cancelled};
@@ -30,12 +30,18 @@ const EASE: f64 = 3.0;
 const AHEAD: f64 = 2.5;
 /// Ratios of successive steps.
 const CHANGE: [f64; 2] = [0.25, 2.0];
+/// The longest step after a refused one, in units of it, and its growth with each step.
+const SHORTER: f64 = 0.7;
+const LONGER: f64 = 1.15;
 /// Steps over a place where branches cross.
 const ACROSS: [f64; 3] = [1e-4, 1e-3, 1e-2];
 /// Steps of a branch at most.
 const STEPS: usize = 20_000;
 /// Fastest motion of an orbit that is followed.
 const FASTEST: f64 = 1e3;
+/// Largest norm of the derivative of a period: Newton's method converges within about its inverse, and a window of stable
+/// orbits is no wider than about its inverse square.
+pub(super) const PARTED: f64 = 1e6;
 /// Largest distance of two points of one orbit.
 pub(super) const SAME: f64 = 1e-7;
 
@@ -131,7 +137,7 @@ impl Cycles<'_> {
         cancel: &AtomicBool,
     ) -> Result<(Run, End), Error> {
         let mut run = Run { orbits: vec![first.clone()], events: Vec::new() };
-        let mut length = FIRST;
+        let (mut length, mut most) = (FIRST, LONGEST * self.ease());
         let mut refused = None;
         for _ in 0..STEPS {
             unless_cancelled(cancel)?;
@@ -144,7 +150,10 @@ impl Cycles<'_> {
                 continue;
             }
             match self.step(&run.orbits, length, &mut refused) {
-                Step::Long(factor) => length *= factor,
+                Step::Long(factor) => {
+                    most = SHORTER * length;
+                    length *= factor;
+                }
                 Step::Over(end, last) => {
                     if let Some(last) = last {
                         event::between(self, &here, &last, &mut run);
@@ -186,7 +195,8 @@ impl Cycles<'_> {
                         return Ok((run, End::Closed));
                     }
                     event::between(self, &here, &next, &mut run);
-                    length = (length * factor).min(LONGEST * self.ease());
+                    most = (LONGER * most).min(LONGEST * self.ease());
+                    length = (length * factor).min(most);
                 }
             }
         }
@@ -229,6 +239,9 @@ impl Cycles<'_> {
             *refused = None;
             return Step::Long(CHANGE[0]);
         };
+        if next.norm > PARTED && self.of.closure != Closure::Rest {
+            return Step::Over(End::Lost(next.norm), None);
+        }
         let turn = here.tangent.dot(&next.tangent).clamp(-1.0, 1.0).acos();
         let [before, after] = [here, &next].map(|one| 0.5 * (one.tests[1] - one.tests[0]));
         let change = (after - before).abs() / (2.0 + before.abs().min(after.abs()));

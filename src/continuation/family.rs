@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 use std::sync::atomic::AtomicBool;
 
-use super::branch::{Bounds, End, Run};
+use super::branch::{Bounds, End, PARTED, Run};
 use super::course::Course;
 use super::cycle::{Closure, Cycles, Orbit, Type};
 use super::event::{Event, Kind};
@@ -20,6 +20,9 @@ use crate::orbit::symmetry::Mirror;
 const MEETS: f64 = 1e-3;
 /// Distance from the event of a parent's branch at which the branch is begun, over the range.
 const BESIDE: f64 = 1e-4;
+
+/// Steps of the integrator over a period at most.
+const MOST_STEPS: usize = 10_000;
 
 /// A branch of orbits of one type.
 #[derive(Clone, Debug)]
@@ -64,6 +67,12 @@ impl Family {
         }
         for end in [low, high] {
             course.check(&[end])?;
+            let count = Period::<3>::count(&course, &[end]);
+            if count > MOST_STEPS {
+                let name = "steps of a forcing period at either end of the range";
+                let allowed = "10000 or fewer: a drive that is weaker or faster";
+                return Err(Error::Range { name, value: count as f64, allowed });
+            }
         }
         // What breaks the symmetry somewhere on the course does so on all of it but for single places.
         let inner = [0.29, 0.61].map(|part| course.pendulum(&[low + part * (high - low)]));
@@ -132,8 +141,10 @@ impl Family {
     ) -> Result<bool, Error> {
         let cycles = self.cycles(of);
         let first = cycles.near(&cycles.place(points, at), &cycles.along());
-        // Where friction holds the pendulum for ever, orbits are not isolated.
-        let Some(first) = first.filter(|orbit| !orbit.stuck) else { return Ok(false) };
+        // Where friction holds the pendulum for ever, orbits are not isolated; where motions part fast, none is followed.
+        let Some(first) = first.filter(|one| !one.stuck && one.norm < PARTED) else {
+            return Ok(false);
+        };
         let branch = cycles.both_ways(first, self.bounds, cancel)?;
         self.branches.push(branch);
         Ok(true)

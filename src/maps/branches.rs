@@ -1,12 +1,12 @@
 //! All branches of orbits of one type, or of all types up to a period, along a parameter.
 //!
-//! Orbits are searched as by [`super::orbits`] at sections of the range: in its middle, beside its ends, where every branch
+//! Orbits are searched as by `every_orbit` at sections of the range: in its middle, beside its ends, where every branch
 //! ends that does not end within, then each in the largest gap that the golden section leaves. A branch is followed through each orbit that none passes through yet, until several sections in a row have
 //! had none. What a branch sheds is followed too.
 
 use super::control::Control;
-use super::orbits::{self, LONGEST, Request as Search};
-use super::starts::Axis;
+use super::every_orbit::{ANY_TURNS, of_types};
+use super::orbits::{LONGEST, MOST_CELLS};
 use crate::continuation::branch::Bounds;
 use crate::continuation::course::Course;
 use crate::continuation::family::Family;
@@ -15,7 +15,8 @@ use crate::error::Error;
 use crate::integrate::State;
 use crate::model::Pendulum;
 use crate::model::pendulum::Symmetry;
-use crate::orbit::{PoincareMap, newton};
+use crate::orbit::PoincareMap;
+use crate::orbit::newton::{self, PeriodicOrbit, SAME};
 
 /// Sections at least, at most, and in a row without a new branch.
 const LEAST: usize = 6;
@@ -23,10 +24,6 @@ const MOST: usize = 40;
 const QUIET: usize = 3;
 /// Distance of the sections beside the ends from these, in parts of the range.
 const EDGE: f64 = 1e-3;
-/// Cells along a side of the box of a search, a period, of one type and of all, and periods counted.
-const CELLS: usize = 200;
-const FEWER: usize = 60;
-const FINER: usize = 4;
 /// Largest distance of Newton's method from a given start.
 const REACH: f64 = 0.5;
 
@@ -113,11 +110,7 @@ pub fn branches(
             _ => (0.5 + 0.618_033_988_749_895 * (k - 2) as f64).fract(),
         };
         let at = bounds.low + part * (bounds.high - bounds.low);
-        let pendulum = family.pendulum(at);
-        let mut found = Vec::new();
-        for asked in asked(&pendulum, request, family.symmetry)? {
-            found.extend(orbits::orbits(&pendulum, &asked, control)?.closed);
-        }
+        let found = orbits(&family.pendulum(at), request, family.symmetry, control)?;
         let mut new = false;
         for orbit in &found {
             if !family.passes(orbit, at) {
@@ -133,48 +126,32 @@ pub fn branches(
     Ok(Branches { family, sections, regions })
 }
 
-/// The searches at one section. Orbits turn on average no faster than the fastest start; those that turn backward are
-/// left out where they are mirror images.
-fn asked(
+/// The orbits searched, at one section; of mirror images of all one.
+fn orbits(
     pendulum: &Pendulum,
     request: &Request,
     symmetry: Option<Symmetry>,
-) -> Result<Vec<Search>, Error> {
-    match request.sought {
-        Sought::Near(_) => Ok(Vec::new()),
-        Sought::Type(n, w) => {
-            let turning = w.unsigned_abs() as f64 / n as f64 * pendulum.drive.omega;
-            Ok(vec![window(pendulum, (n, [w; 2]), turning, CELLS * n.min(FINER), request.threads)?])
-        }
-        Sought::UpTo(most) => {
-            let fastest = pendulum.drive.omega + falling(pendulum);
-            let one = |n: usize| {
-                let turns = (n as f64 * fastest / pendulum.drive.omega).floor() as i64;
-                let least = if symmetry == Some(Symmetry::AtOnce) { 0 } else { -turns };
-                let w = [least, turns];
-                window(pendulum, (n, w), pendulum.drive.omega, FEWER * n, request.threads)
-            };
-            (1..=most).map(one).collect()
-        }
-    }
+    control: &Control,
+) -> Result<Vec<PeriodicOrbit>, Error> {
+    let types: Vec<_> = match &request.sought {
+        Sought::Type(n, w) => vec![(*n, [*w; 2])],
+        Sought::UpTo(most) => (1..=*most).map(|n| (n, ANY_TURNS)).collect(),
+        Sought::Near(_) => Vec::new(),
+    };
+    let mirrored = symmetry == Some(Symmetry::AtOnce) && types.iter().all(|(_, [a, b])| *a == -b);
+    let mut all = of_types(pendulum, &types, mirrored, MOST_CELLS, request.threads, control)?;
+    // Where nothing drives the pendulum, orbits close after a given time only by coincidence.
+    let rests = |orbit: &PeriodicOrbit| orbit.points[0][1].abs() < SAME;
+    all.retain(|orbit| {
+        let asked = |(n, [least, most]): &(usize, [i64; 2])| {
+            *n == orbit.n && (*least..=*most).contains(&orbit.w)
+        };
+        types.iter().any(asked) && (!pendulum.is_autonomous() || rests(orbit))
+    });
+    Ok(all)
 }
 
 /// The velocity of a fall from the top under the drive's largest acceleration.
 pub(super) fn falling(pendulum: &Pendulum) -> f64 {
     2.0 * (1.0 + pendulum.drive.p.abs()).sqrt()
-}
-
-/// The box of a search: velocities to that of a rotation and of a fall.
-fn window(
-    pendulum: &Pendulum,
-    (n, w): (usize, [i64; 2]),
-    turning: f64,
-    cells: usize,
-    threads: usize,
-) -> Result<Search, Error> {
-    let reach = turning + falling(pendulum);
-    let pi = std::f64::consts::PI;
-    let theta = Axis::new("theta", -pi, pi, cells)?;
-    let velocity = Axis::new("velocity", -reach, reach, cells)?;
-    Ok(Search { n, w, theta, velocity, threads })
 }

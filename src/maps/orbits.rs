@@ -26,7 +26,7 @@ use crate::orbit::symmetry::Mirror;
 /// The longest period of a request, in forcing periods.
 pub const LONGEST: usize = 64;
 /// Largest number of cells that are quartered.
-const MOST_CELLS: usize = 60_000;
+pub(super) const MOST_CELLS: usize = 60_000;
 /// Error of the displacements after five periods, used for starting points only.
 const TOLERANCE: f64 = 1e-6;
 /// Memory of a cell, bytes: its corner, its image, and intermediate results.

@@ -407,8 +407,9 @@ def _summary(dataset: xr.Dataset) -> list[str]:
     if "section_value" in dataset:
         sections = counted(dataset.sizes["section"], "section")
         lines.append(f"Orbits were searched at {sections} of the range.")
-    lost = [end for side in ("begin", "end") for end in dataset[f"branch_{side}"].values.tolist()]
-    open_ends = sum(end in {"precision lost", "branches cross"} for end in lost)
-    if open_ends:
-        lines.append(f"{counted(open_ends, 'end')} of branches could not be followed further.")
+    ends = [*rows(dataset, "branch_begin", "branch_first")]
+    ends += rows(dataset, "branch_end", "branch_last")
+    if lost := [at for why, at in ends if why in {"precision lost", "branches cross"}]:
+        where = span(name, min(lost), max(lost))
+        lines.append(f"{counted(len(lost), 'end')} of branches could not be followed, at {where}.")
     return lines
