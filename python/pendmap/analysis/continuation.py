@@ -400,16 +400,15 @@ def _summary(dataset: xr.Dataset) -> list[str]:
     for part in parts[:_LISTED]:
         stable = ", ".join(orbit["name"] for orbit in part["stable"]) or "none"
         lines.append(f"{span(name, part['from'], part['to'])}: stable orbits: {stable}.")
-    more = {"events": len(happens), "regions": len(parts)}
-    lines += [
-        f"{k - _LISTED} more {what} are in the result." for what, k in more.items() if k > _LISTED
-    ]
+    for what, k in (("events", len(happens)), ("regions", len(parts))):
+        if k > _LISTED:
+            lines.append(f"{k - _LISTED} more {what} are in the result.")
     if "section_value" in dataset:
         sections = counted(dataset.sizes["section"], "section")
         lines.append(f"Orbits were searched at {sections} of the range.")
     ends = [*rows(dataset, "branch_begin", "branch_first")]
     ends += rows(dataset, "branch_end", "branch_last")
     if lost := [at for why, at in ends if why in {"precision lost", "branches cross"}]:
-        where = span(name, min(lost), max(lost))
-        lines.append(f"{counted(len(lost), 'end')} of branches could not be followed, at {where}.")
+        where = counted(len(lost), "branch is lost", "branches are lost")
+        lines.append(f"{where} at {span(name, min(lost), max(lost))}.")
     return lines
