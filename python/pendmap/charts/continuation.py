@@ -278,7 +278,7 @@ def bifurcation_set(
         # Where new orbits change their side the coefficient has no sign.
         thin, thick = (one[mine][first + changes[mine][first]] for one in (sides == 0, jumps > 0))
         path = f"{name}/{kind}/{number}".replace(" ", "_").replace(":", "_")
-        looks = (1.5, ~(thin | thick), path), (0.6, thin, f"{path}/subcritical")
+        looks = (0.9 if colours else 1.5, ~(thin | thick), path), (0.6, thin, f"{path}/subcritical")
         for width, shown, at in (*looks, (2.8, thick, f"{path}/jump")):
             # A piece belongs to both looks at the point where it changes.
             near = shown | np.roll(shown, 1) & (np.arange(shown.size) > 0)
