@@ -212,11 +212,12 @@ impl Cycles<'_> {
                 run.orbits.push(after);
             }
             None => {
-                if let Some(after) = self.turned_back(here) {
-                    transition::crossed(self, run, here, after);
+                let here = transition::retreated(run);
+                if let Some(after) = self.turned_back(&here) {
+                    transition::crossed(self, run, &here, after);
                     return None;
                 }
-                return Some(self.faded(here, run).unwrap_or(End::Lost(here.norm)));
+                return Some(self.faded(&here, run).unwrap_or(End::Lost(here.norm)));
             }
             _ => return self.faded(here, run).or(refused),
         }

@@ -208,10 +208,8 @@ impl Family {
             }
             for number in 0..self.branches[next].run.events.len() {
                 let branch = &self.branches[next];
-                let Event { kind, orbit, rises, smooth, .. } = branch.run.events[number];
-                if !smooth {
-                    continue;
-                }
+                let event = branch.run.events[number].clone();
+                let Event { kind, orbit, rises, .. } = event;
                 let cycles = self.cycles(branch.of);
                 let orbit = &branch.run.orbits[orbit];
                 if kind == Kind::NeimarkSacker {
@@ -233,7 +231,7 @@ impl Family {
                 let mut side = None;
                 let mut new = Vec::new();
                 for sense in senses {
-                    let Some(shed) = cycles.shed(orbit, kind, *sense) else { continue };
+                    let Some(shed) = cycles.shed(orbit, &event, *sense) else { continue };
                     side = Some(shed.side);
                     if self.end_at(of, &place.0, place.1).is_none() && of.n <= self.longest {
                         let cycles = self.cycles(of);

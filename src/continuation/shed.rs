@@ -2,10 +2,11 @@
 //!
 //! The closing map of the new orbits has the multiplier 1 there, and its eigenvector points to them. At the distance `e`
 //! along it the new orbit is at the coordinate `l + c e^2 + O(e^4)`: `c` is the normal form's coefficient over the speed
-//! at which the multiplier passes, and its sign says on which side the new orbits live.
+//! at which the multiplier passes, and its sign says on which side the new orbits live. Where a multiplier jumps over the
+//! critical value the coordinate is linear in `e`, and the sign alone has a meaning.
 
 use super::cycle::{Closure, Cycles, Orbit, Type};
-use super::event::Kind;
+use super::event::{Event, Kind};
 use crate::integrate::State;
 use crate::model::pendulum::Symmetry;
 
@@ -44,11 +45,11 @@ impl Cycles<'_> {
         }
     }
 
-    /// What the orbit sheds at an event of this kind, to one side of it or, in the sense -1, to the other; none where no
+    /// What the orbit sheds at an event, to one side of it or, in the sense -1, to the other; none where no
     /// new orbit is found.
     #[must_use]
-    pub fn shed(&self, orbit: &Orbit, kind: Kind, sense: f64) -> Option<Shed> {
-        let of = self.shed_type(kind)?;
+    pub fn shed(&self, orbit: &Orbit, event: &Event, sense: f64) -> Option<Shed> {
+        let of = self.shed_type(event.kind)?;
         let new = Cycles { of, ..*self };
         let at = self.at(&orbit.place);
         let place = new.place(&self.repeated(orbit, &new), at);
@@ -63,8 +64,8 @@ impl Cycles<'_> {
             // Without the next term of the series.
             let side = (4.0 * side(&half, 0.5 * distance) - side(&far, *distance)) / 3.0;
             let near = (&far.place - &place).norm() < STRAYED * distance;
-            // Nothing has happened on the new branch yet.
-            let alike = (far.tests[1] - old.tests[1]).abs() < TURNED;
+            // Nothing has happened on the new branch yet; beside a jump its orbits slip in another sequence than the old one.
+            let alike = !event.smooth || (far.tests[1] - old.tests[1]).abs() < TURNED;
             (near && alike).then_some((far, side))
         });
         let (far, side) = first?;

@@ -146,6 +146,19 @@ fn undone(run: &Run, after: &Orbit) -> Option<usize> {
     (near && onward && before.is_like(after)).then_some(orbit)
 }
 
+/// The last orbit of a run without a change of phases just before it: no step leads on, so the branch turns back there.
+pub(super) fn retreated(run: &mut Run) -> Orbit {
+    let last = run.orbits.len() - 1;
+    if let Some(&Event { orbit, smooth: false, kind: Kind::StickOnset | Kind::Grazing, .. }) =
+        run.events.last()
+        && (&run.orbits[last].place - &run.orbits[orbit].place).norm() < NEIGHBOURS
+    {
+        run.events.retain(|event| event.orbit < orbit);
+        run.orbits.truncate(orbit + 1);
+    }
+    run.orbits[run.orbits.len() - 1].clone()
+}
+
 /// Marks the last orbit of a run as one beyond which friction holds the pendulum for ever.
 pub(super) fn swallowed(run: &mut Run) {
     let orbit = run.orbits.len() - 1;
