@@ -210,7 +210,7 @@ def bracketed(data: xr.Dataset, event: dict[str, Any], values: Floats, varied: i
         moved = values.copy()
         moved[varied] = event["value"] + by
         motion = Motion(moved)
-        near = beside(x, at, place, moved[varied])[: 2 if kind == "fold" else 1]
+        near = beside(x, at, place, moved[varied])[:2]
         orbits = [motion.orbit(one) for one in near]
         sides.append((motion, [one for one in orbits if one is not None]))
     if kind == "rest_boundary":
@@ -222,13 +222,17 @@ def bracketed(data: xr.Dataset, event: dict[str, Any], values: Floats, varied: i
             return False
         test = [motion.test(x, 1) for x in both]
         return test[0] * test[1] < 0 and empty.orbit(0.5 * (both[0] + both[1])) is None
-    if not all(orbits for _, orbits in sides):
-        return False
+    if all(orbits for _, orbits in sides):
+        one, other = ((motion, orbits[0]) for motion, orbits in sides)
+    else:
+        # Where the branch turns back both of its sides are on one of the parameter.
+        (_, none), (motion, both) = sorted(sides, key=lambda side: len(side[1]))
+        if none or len(both) != 2:  # noqa: PLR2004
+            return False
+        one, other = ((motion, orbit) for orbit in both)
     if kind in {"period_doubling", "symmetry_breaking"}:
-        test = [motion.test(orbits[0], CRITICAL[kind]) for motion, orbits in sides]
-        return test[0] * test[1] < 0
-    seen = [motion.phases(orbits[0]) for motion, orbits in sides]
-    return seen[0] != seen[1]
+        return one[0].test(one[1], CRITICAL[kind]) * other[0].test(other[1], CRITICAL[kind]) < 0
+    return one[0].phases(one[1]) != other[0].phases(other[1])
 
 
 def is_alone(event: dict[str, Any], places: list[tuple[int, float]]) -> bool:

@@ -259,8 +259,8 @@ impl Cycles<'_> {
         if let Some((end, last)) = self.meeting(here, &next) {
             return Step::Over(end, Some(Box::new(last)));
         }
-        if next.stuck || self.fades(&next) {
-            *refused = Some(End::Sticks);
+        if next.stuck || self.fades(&next) || next.smooth != here.smooth {
+            *refused = Some(if next.smooth { End::Sticks } else { End::Rest });
             return Step::Long(CHANGE[0]);
         }
         if smooth && next.orientation != here.orientation {

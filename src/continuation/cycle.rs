@@ -26,8 +26,9 @@ use super::period::{Image, Period};
 use super::phases::{Phase, round};
 use crate::integrate::State;
 use crate::model::pendulum::Symmetry;
-use crate::orbit::Multipliers;
 use crate::orbit::floquet::multipliers;
+use crate::orbit::kink::PRECISE;
+use crate::orbit::{KinkedRest, Multipliers};
 
 /// Newton's steps at most, and the part of the step before that a step may have.
 const ITERATIONS: usize = 8;
@@ -87,6 +88,8 @@ pub struct Orbit {
     pub moved: f64,
     /// Largest norm of a derivative.
     pub norm: f64,
+    /// Whether the map is differentiable there: not at rest on a kink of the load.
+    pub smooth: bool,
 }
 
 impl Orbit {
@@ -318,7 +321,11 @@ impl Cycles<'_> {
         moved: f64,
     ) -> Orbit {
         let parts: Vec<Matrix2<f64>> = system.images.iter().map(|image| image.by_state).collect();
-        let tests = [1.0, -1.0].map(|m| self.weak(&parts, m).lu().determinant());
+        let kinked = self.kinked(&place);
+        let tests = [1.0, -1.0].map(|m| match kinked {
+            Some([sum, product]) => 1.0 - m * sum + product,
+            None => self.weak(&parts, m).lu().determinant(),
+        });
         let law: Option<f64> = system.images.iter().map(|image| image.product).product();
         let own = parts.iter().map(Matrix2::determinant).product();
         let phases = system.images.iter().flat_map(|image| image.phases.iter().copied());
@@ -334,7 +341,10 @@ impl Cycles<'_> {
         let held = system.images.iter().any(|image| image.held[1]);
         let both = [Phase::Forward, Phase::Backward].iter().all(|sense| phases.contains(sense));
         let stuck = held || self.of.w == 0 && !phases.is_empty() && !both;
-        let product = law.map_or((own, false), |law| (law, true));
+        let product = match kinked {
+            Some([_, product]) => (product, false),
+            None => law.map_or((own, false), |law| (law, true)),
+        };
         let norm = system.norm;
         Orbit {
             place,
@@ -348,7 +358,19 @@ impl Cycles<'_> {
             stuck,
             moved,
             norm,
+            smooth: kinked.is_none(),
         }
+    }
+
+    /// Sum and product of the multipliers of a rest on a kink of the load, see [`KinkedRest`].
+    fn kinked(&self, place: &DVector<f64>) -> Option<[f64; 2]> {
+        let [[theta, velocity]] = self.points(place)[..] else { return None };
+        if velocity.abs() > STILL {
+            return None;
+        }
+        let rest = KinkedRest::of(&self.course.pendulum(&self.coordinates(place)), theta)?;
+        let Multipliers([a, b]) = rest.multipliers(PRECISE);
+        Some([(a + b).re, (a * b).re])
     }
 
     /// The matrix whose determinant is `det(M - m)` and whose kernel holds the eigenvector at each point, if `m` is

@@ -74,7 +74,7 @@ pub struct Event {
     pub rises: f64,
     /// Whether the new orbits live where the old one has lost its stability; none where there are no new ones.
     pub supercritical: Option<bool>,
-    /// Whether the map is smooth there: not where the phases change.
+    /// Whether the map is smooth there: not where the phases change, nor at rest on a kink.
     pub smooth: bool,
 }
 
@@ -120,6 +120,9 @@ fn tests(cycles: &Cycles<'_>, orbit: &Orbit) -> &'static [(Kind, Test)] {
         return &[(Kind::SymmetryBreaking, upper), (Kind::SymmetryBreaking, lower)];
     }
     match cycles.of.closure {
+        _ if !orbit.smooth => {
+            &[(Kind::Fold, plus), (Kind::PeriodDoubling, minus), (Kind::NeimarkSacker, circle)]
+        }
         Closure::Whole => {
             &[(Kind::Fold, fold), (Kind::PeriodDoubling, minus), (Kind::NeimarkSacker, circle)]
         }
@@ -216,9 +219,10 @@ fn passed(cycles: &Cycles<'_>, here: &Orbit, next: &Orbit, run: &mut Run) {
         if run.events.last().is_some_and(same) {
             continue;
         }
+        let smooth = orbit.smooth;
         run.orbits.push(orbit);
         let orbit = run.orbits.len() - 1;
-        run.events.push(Event { kind, orbit, rises, supercritical: None, smooth: true });
+        run.events.push(Event { kind, orbit, rises, supercritical: None, smooth });
     }
     run.orbits.push(next.clone());
 }

@@ -210,6 +210,9 @@ impl Family {
                 let branch = &self.branches[next];
                 let event = branch.run.events[number].clone();
                 let Event { kind, orbit, rises, .. } = event;
+                if !branch.run.orbits[orbit].smooth {
+                    continue;
+                }
                 let cycles = self.cycles(branch.of);
                 let orbit = &branch.run.orbits[orbit];
                 if kind == Kind::NeimarkSacker {

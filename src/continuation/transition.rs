@@ -91,7 +91,8 @@ impl Cycles<'_> {
         if !points.iter().all(still) {
             return None;
         }
-        let equation = self.course.pendulum(&[self.origin + along * self.scale]).equation();
+        let pendulum = self.course.pendulum(&[self.origin + along * self.scale]);
+        let equation = pendulum.has_friction().then(|| pendulum.equation())?;
         let theta = angle(&equation, theta, FADED)?;
         Some((theta, equation.excess(theta)))
     }

@@ -138,6 +138,33 @@ def test_an_oscillation_begins_where_friction_ceases_to_hold_the_pendulum() -> N
     assert (plane.region_stable.values >= 0).all()
 
 
+def test_beyond_p_1_an_oscillation_begins_at_equal_loads() -> None:
+    # Loads in both senses are equal where sin theta is the torque, there p times the torque.
+    model = pendmap.Pendulum(gamma=0.1, omega=1.4, torque=0.1, theta_r=0.2)
+    found = pendmap.continuation(model, {"p": (1.9, 2.05)}, n=1, w=0)
+    first, *_ = found.event_value.values[found.event_kind.values == "rest_boundary"]
+    assert first == pytest.approx(2.0, abs=1e-10)
+    assert (found.orbit_value.values > 2.0 - 1e-10).all()
+
+
+def test_a_doubled_orbit_is_followed_from_a_jump_over_minus_1() -> None:
+    model = pendmap.Pendulum(gamma=0.05, theta_r=0.4, omega=1.17)
+    found = pendmap.continuation(model, {"p": (2.3, 2.5)}, n=1, w=1, longest=2)
+    doubled = found.event_value.values[found.event_kind.values == "period_doubling"]
+    (branch,) = np.flatnonzero(found.branch_n.values == 2)
+    ends = [found[f"branch_{end}"].values[branch] for end in ("first", "last")]
+    assert ends == pytest.approx(sorted(doubled), abs=1e-8)
+    # The search of orbits finds it too, on both of its sides before it turns back.
+    mine = found.orbit_value.values[found.orbit_branch.values == branch]
+    at = 0.5 * (mine.min() + ends[0])
+    assert (
+        pendmap.orbit(pendmap.Pendulum(gamma=0.05, theta_r=0.4, omega=1.17, p=at), 2, 2).sizes[
+            "orbit"
+        ]
+        == 2
+    )
+
+
 def test_the_figure_names_changes_of_slips_and_sticks(rough: xr.Dataset) -> None:
     (panel,) = registry.build(registry.ready(rough)).panels
     shown = {mark.name for mark in panel.marks if isinstance(mark, Line)}

@@ -113,6 +113,12 @@ def test_critical_amplitudes_are_where_the_growth_vanishes(
         expected(Pendulum(gamma, p * by, omega), b, theta, 60) < 0 for by in (1 - 1e-4, 1 + 1e-4)
     ]
     assert sides == [not above, above]
+    if theta == 0:
+        model = Pendulum(gamma, 0.5, omega, effects=effects)
+        along = pendmap.continuation(model, {"p": (0.5 * p, 1.2 * p)}, n=1, w=0, longest=1)
+        at_rest = np.abs(along.event_theta.values) + np.abs(along.event_velocity.values) < 1e-9
+        assert along.event_value.values[at_rest] == pytest.approx([p], abs=1e-9)
+        assert along.event_kind.values[at_rest] == ["period_doubling"]
 
 
 @pytest.mark.parametrize(
