@@ -155,14 +155,20 @@ def test_a_doubled_orbit_is_followed_from_a_jump_over_minus_1() -> None:
     ends = [found[f"branch_{end}"].values[branch] for end in ("first", "last")]
     assert ends == pytest.approx(sorted(doubled), abs=1e-8)
     # The search of orbits finds it too, on both of its sides before it turns back.
-    mine = found.orbit_value.values[found.orbit_branch.values == branch]
-    at = 0.5 * (mine.min() + ends[0])
-    assert (
-        pendmap.orbit(pendmap.Pendulum(gamma=0.05, theta_r=0.4, omega=1.17, p=at), 2, 2).sizes[
-            "orbit"
-        ]
-        == 2
+    of = found.orbit_branch.values == branch
+    value, theta = (
+        found.orbit_value.values[of],
+        found.point_theta.values[
+            np.flatnonzero(np.isin(found.point_orbit.values, np.flatnonzero(of)))[::2]
+        ],
     )
+    at, turn = 0.5 * (value.min() + ends[0]), int(value.argmin())
+    model = pendmap.Pendulum(gamma=0.05, theta_r=0.4, omega=1.17, p=at)
+    every = pendmap.orbit(model, 2, 2).point_theta.values
+    for side in (slice(0, turn + 1), slice(turn, None)):
+        order = np.argsort(value[side])
+        guess = np.interp(at, value[side][order], np.unwrap(theta[side])[order])
+        assert np.abs(np.sin(0.5 * (every - guess))).min() < 1e-3
 
 
 def test_the_figure_names_changes_of_slips_and_sticks(rough: xr.Dataset) -> None:
