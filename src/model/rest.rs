@@ -109,9 +109,15 @@ impl Equation<f64> {
             return [a.max(b) - hold, -a.min(b) - hold];
         }
         let interval = self.time_scale() / SAMPLES as f64;
-        let at = |k: usize| excesses(self, interval * k as f64, theta);
-        let greater = |a: [f64; 2], b: [f64; 2]| [a[0].max(b[0]), a[1].max(b[1])];
-        (0..SAMPLES).map(at).fold([f64::NEG_INFINITY; 2], greater)
+        let all: Vec<[f64; 2]> =
+            (0..SAMPLES).map(|k| excesses(self, interval * k as f64, theta)).collect();
+        [0, 1].map(|side| {
+            let greater = |a: &usize, b: &usize| all[*a][side].total_cmp(&all[*b][side]);
+            let best = (0..SAMPLES).max_by(greater).unwrap_or(0);
+            let [before, after] = [-1.0, 1.0].map(|by| interval * (best as f64 + by));
+            let value = |tau: f64| excesses(self, tau, theta)[side];
+            highest(value, before, after).1.max(all[best][side])
+        })
     }
 }
 
@@ -209,7 +215,8 @@ fn sampled<L: Load>(load: &L, tau: f64, theta: f64, end: f64, edge: f64) -> Opti
         let mut positive = (now > edge).then(|| time(k));
         if before[1] > before[0] && before[1] >= now {
             // A maximum lies about the sample before: it may be positive on its own.
-            let (peak, height) = highest(load, theta, time(k.saturating_sub(2)), time(k));
+            let value = |tau: f64| greatest(load, tau, theta).0;
+            let (peak, height) = highest(value, time(k.saturating_sub(2)), time(k));
             if height > edge {
                 positive = Some(peak);
             }
@@ -223,13 +230,12 @@ fn sampled<L: Load>(load: &L, tau: f64, theta: f64, end: f64, edge: f64) -> Opti
     None
 }
 
-/// The greatest excess between two times, by the golden section.
-fn highest<L: Load>(load: &L, theta: f64, from: f64, to: f64) -> (f64, f64) {
+/// The time between two at which an excess is greatest, and its value there, by the golden section.
+fn highest(value: impl Fn(f64) -> f64, from: f64, to: f64) -> (f64, f64) {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
-    let value = |tau: f64| greatest(load, tau, theta).0;
     let (mut low, mut high) = (from, to);
     let mut inner = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)];
-    let mut values = inner.map(value);
+    let mut values = inner.map(&value);
     for _ in 0..SECTIONS {
         if values[0] > values[1] {
             high = inner[1];

@@ -147,6 +147,18 @@ def test_beyond_p_1_an_oscillation_begins_at_equal_loads() -> None:
     assert (found.orbit_value.values > 2.0 - 1e-10).all()
 
 
+def test_an_oscillation_begins_at_equal_loads_under_a_sideways_drive() -> None:
+    # The load is torque - sin theta - p (sin theta cos a + e cos theta cos(a + phase)).
+    p, torque, e, phase = 1.2, 0.1, 0.2, 2.0
+    effects = (pendmap.Effect("lateral_drive", {"e": e, "phase": phase}),)
+    model = pendmap.Pendulum(gamma=0.1, p=p, omega=1.4, torque=torque, effects=effects)
+    found = pendmap.continuation(model, {"theta_r": (0.05, 0.5)}, n=1, w=0, longest=1)
+    across = e * np.sqrt(1 - torque**2)
+    swing = p * np.sqrt(torque**2 + across**2 + 2 * torque * across * np.cos(phase))
+    events = found.event_value.values[found.event_kind.values == "rest_boundary"]
+    assert np.abs(events - swing).min() < 1e-10
+
+
 def test_a_doubled_orbit_is_followed_from_a_jump_over_minus_1() -> None:
     model = pendmap.Pendulum(gamma=0.05, theta_r=0.4, omega=1.17)
     found = pendmap.continuation(model, {"p": (2.3, 2.5)}, n=1, w=1, longest=2)
