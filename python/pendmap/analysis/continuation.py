@@ -129,7 +129,7 @@ def continuation(  # noqa: PLR0913 (physics first, numerical choices by name)
 
     An orbit is a zero of ``P(x_i) - x_(i+1)`` over its points, ``P`` the stroboscopic map. Branches
     are followed by pseudo-arclength, around folds and where orbits are unstable. Orbits are
-    searched, as by :func:`pendmap.orbit`, at sections of the range until three in a row have none
+    searched, of mirror images one, at sections of the range until three in a row have none
     that no branch passes through. Folds (a multiplier passes 1), period doublings (-1), symmetry
     breakings and passages of a complex pair are located to rounding; the orbits that are born
     there are followed too, both twins of a symmetry breaking. Under dry friction so are the values
