@@ -118,8 +118,7 @@ impl Cycles<'_> {
 /// rounding.
 pub(super) fn crossed(cycles: &Cycles<'_>, run: &mut Run, before: &Orbit, after: Orbit) {
     if let Some(first) = undone(run, &after) {
-        run.events.retain(|event| event.orbit < first);
-        run.orbits.truncate(first + 1);
+        run.forget_after(first);
         run.orbits.push(after);
         return;
     }
@@ -138,6 +137,14 @@ pub(super) fn crossed(cycles: &Cycles<'_>, run: &mut Run, before: &Orbit, after:
     run.orbits.push(after);
 }
 
+impl Run {
+    /// Forgets an event and all that follows its orbit.
+    fn forget_after(&mut self, orbit: usize) {
+        self.events.retain(|event| event.orbit < orbit);
+        self.orbits.truncate(orbit + 1);
+    }
+}
+
 /// The orbit before the last change of phases, if the branch is back there in the same sense.
 fn undone(run: &Run, after: &Orbit) -> Option<usize> {
     let Event { orbit, smooth: false, .. } = *run.events.last()? else { return None };
@@ -154,8 +161,7 @@ pub(super) fn retreated(run: &mut Run) -> Orbit {
         run.events.last()
         && (&run.orbits[last].place - &run.orbits[orbit].place).norm() < NEIGHBOURS
     {
-        run.events.retain(|event| event.orbit < orbit);
-        run.orbits.truncate(orbit + 1);
+        run.forget_after(orbit);
     }
     run.orbits[run.orbits.len() - 1].clone()
 }

@@ -101,8 +101,8 @@ pub(super) fn of_types(
         let known = |state: &State| all.iter().any(|orbit| orbit.contains(*state, KNOWN));
         let starts: Vec<(State, usize)> =
             near.into_iter().filter(|state| !known(state)).map(|state| (state, n)).collect();
-        for orbit in newton::find_others(&map, &starts, LEAST_REACH, &[]) {
-            let (mut orbit, mut image) = (orbit.clone(), orbit.mirrored().0);
+        for mut orbit in newton::find_others(&map, &starts, LEAST_REACH, &[]) {
+            let mut image = orbit.mirrored().0;
             if mirrored && orbit.w < 0 {
                 std::mem::swap(&mut orbit, &mut image);
             }
